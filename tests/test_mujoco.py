@@ -357,3 +357,33 @@ def test_a_joint_that_describes_no_drive_is_refused() -> None:
         lm.mujoco.from_mjcf(arm_model(1e-3), "elbow")
     with pytest.raises(lm.InputError, match="joint 'elbow': has no armature"):
         lm.mujoco.from_mjcf(arm_model(1e-3), "elbow", ratio=100.0)
+
+
+SCREW = {
+    "motors": {"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 2e-4, "friction_torque": 0.05}},
+    "shafts": {"motor": {}},
+    "screws": {"s": {"input": "motor", "output": "table", "lead": 0.01, "stiffness": 8e7, "efficiency": 0.9}},
+    "slides": {"table": {"mass": 30.0, "friction_force": 20.0}},
+    "command": {"m": {}},
+    "simulation": {"duration": 1.0, "sample_interval": 1e-3},
+}
+
+
+def test_a_slide_moves_as_its_axis_under_the_weight_of_the_robot() -> None:
+    joint = '<joint name="table" type="slide" axis="0 0 1"/><geom size=".1" mass="80"/>'
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="0.001" gravity="0 0 -9.81"/><worldbody><body>{joint}</body></worldbody></mujoco>'
+    )
+    robot = lm.mujoco.attach(model, {"table": lm.Scenario(**SCREW)})
+    alone = lm.Simulation(lm.Scenario(**SCREW | {"slides": {"table": {"mass": 80.0, "friction_force": 20.0, "force": {}}}}), step=1e-3)
+    for k in range(300):
+        command = 2.0 + 0.5 * np.sin(0.03 * k)
+        robot.step({"table": command})
+        alone.advance(1e-3, m_command=command, table_load_force=80.0 * 9.81)
+    assert abs(alone["table_position"]) > 0.05
+    assert robot.data.qpos[0] == pytest.approx(alone["table_position"], abs=1e-10)
+    inclined = lm.Scenario(**SCREW).replace(**{"slides.table.inclination": 0.5 * np.pi})
+    with pytest.raises(lm.InputError) as refusal:
+        lm.mujoco.attach(model, {"table": inclined})
+    assert "slides.table.inclination" in refusal.value.problems[0].keys
+    assert lm.mujoco.attach(model, {"table": inclined}, replace=True).drives["table"].slides["table"].inclination == 0.0

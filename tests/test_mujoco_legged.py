@@ -165,7 +165,7 @@ def test_an_equality_couples_two_joints() -> None:
 
 def test_a_free_joint_and_a_missing_library_are_refused(legged: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     model = mujoco.MjModel.from_xml_string(legged.mjcf())
-    with pytest.raises(lm.InputError, match="joint 'trunk': is no hinge; a drive turns a hinge"):
+    with pytest.raises(lm.InputError, match="joint 'trunk': is neither a hinge nor a slide"):
         lm.mujoco.attach(model, {"trunk": drive()})
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(lm.MissingLibraryError, match="mujoco") as caught:

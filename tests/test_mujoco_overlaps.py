@@ -183,7 +183,7 @@ def test_what_cannot_be_taken_off_is_refused() -> None:
         ({"brakes": {"b": {"shaft": "motor", "torque": 1.0}}, "command": {"b": 1.0}}, "brakes.b needs a command"),
         ({"shafts": {"motor": {}, "arm": {"speed": 0.0}}}, "shafts.arm.speed gives a motion, which the robot has"),
         ({"controllers": {"m": CONTROLLER | {"position": {"gain": 1.0, "derivative_gain": 0.1, "derivative_weight": 1.0}}}}, "derivative_weight = 0"),
-        ({"shafts": {"motor": {}}, "gears": {}, "slides": {"table": {"mass": 3.0}}, "screws": {"s": {"input": "motor", "output": "table", "lead": 0.01}}}, "is a hinge, and 'table' is a slide"),
+        ({"shafts": {"motor": {}}, "gears": {}, "slides": {"table": {"mass": 3.0}}, "screws": {"s": {"input": "motor", "output": "table", "lead": 0.01}}}, "is a hinge, and the train ends at 'table'"),
     ],
 )  # fmt: skip
 def test_what_a_robot_cannot_move_is_refused_by_name(more: dict[str, Any], message: str) -> None:

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import JointDrive, JointTrains, joint_drive
-from .joints import acts, joint_id
+from .joints import acts, is_slide, joint_id
 from .mjcf import JointActuator
 
 if TYPE_CHECKING:
@@ -78,8 +78,8 @@ class Actuated:
         mujoco.mj_fullM(model, self.data, mass)
         inertias = 1.0 / np.diag(np.linalg.inv(mass))[self._dofs]
         made = [
-            joint_drive(name, actuator.drive, float(inertia), step)
-            for (name, actuator), inertia in zip(given.items(), inertias, strict=True)
+            joint_drive(name, actuator.drive, float(inertia), step, slides=is_slide(model, joint))
+            for (name, actuator), joint, inertia in zip(given.items(), ids, inertias, strict=True)
         ]
         self._actuators = tuple(given.values())
         self._drives: dict[str, JointDrive] = dict(zip(self.joints, made, strict=True))
@@ -158,7 +158,7 @@ class Actuated:
 
     @property
     def torque(self) -> np.ndarray:
-        """Mean torque of each drive on its joint over the last step [N·m]."""
+        """Mean torque [N·m] of each drive on its hinge, or force [N] on its slide, over the last step."""
         return self._torque.copy()
 
     @property
@@ -210,9 +210,11 @@ class Actuated:
 
     def _away(self, k: int) -> InputError:
         q, v = self.data.qpos[self._addresses[k]], self.data.qvel[self._dofs[k]]
+        drive = self._drives[self.joints[k]]
+        unit = "m" if drive.train.is_slide(drive.shaft) else "rad"
         return InputError(
-            f"joint {self.joints[k]!r}: data has it at {q:.6g} rad, {v:.6g} rad/s, its drive at {self._trains.angle[k]:.6g} rad, "
-            f"{self._trains.speed[k]:.6g} rad/s; call follow() after data has been changed"
+            f"joint {self.joints[k]!r}: data has it at {q:.6g} {unit}, {v:.6g} {unit}/s, its drive at {self._trains.angle[k]:.6g} {unit}, "
+            f"{self._trains.speed[k]:.6g} {unit}/s; call follow() after data has been changed"
         )
 
     def step(self, ctrl: Mapping[str, float] | Sequence[float] | np.ndarray | None = None) -> None:

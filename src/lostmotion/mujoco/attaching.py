@@ -86,12 +86,12 @@ def attach(
     model
         A `mujoco.MjSpec`, a `mujoco.MjModel`, or an MJCF file. The drives are attached to a copy.
     drives
-        By the name of a hinge: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of (of several ends the
-        shaft with the name of the hinge is the load); a scenario or its
+        By the name of a hinge or a slide: a `Drive` or a `DriveTrain`, whose load's inertia the robot takes the place of (of several
+        ends the shaft with the name of the joint is the load); a scenario or its
         name, whose controller then turns the motor; what `from_mjcf` has returned; the name of an actuator of the catalogue; or
         the name of a gearbox, which an ideal torque source without inertia then turns.
     controllers
-        By the name of a hinge: a controller for its drive, which acts at its own sample instants within the steps.
+        By the name of a joint: a controller for its drive, which acts at its own sample instants within the steps.
     replace
         Take what would count twice off. These joints lose what describes a drive in MuJoCo: armature, damping, friction loss,
         actuators and the limit of their torque, and with a spring in the drive their stiffness. The drives lose load torques, and on the shaft of the
@@ -107,7 +107,7 @@ def attach(
     Raises
     ------
     InputError
-        A joint is unknown or no hinge; robot and drive both have something (see `replace`); a drive cannot be used; the timestep
+        A joint is unknown, or neither hinge nor slide; the end of a drive moves otherwise; robot and drive both have something (see `replace`); a drive cannot be used; the timestep
         would take more than 1000 substeps; the model has parts with states of their own.
     MissingLibraryError
         MuJoCo is not installed.

@@ -25,20 +25,32 @@ def compiled(model: mujoco.MjSpec | mujoco.MjModel) -> mujoco.MjModel:
 
 
 def joint_id(model: mujoco.MjModel, name: str) -> int:
-    """The number of a hinge. Raises InputError: the model has no such joint, or it is no hinge."""
+    """The number of a hinge or a slide. Raises InputError: the model has no such joint, or it is another."""
     import mujoco
 
+    moved = (int(mujoco.mjtJoint.mjJNT_HINGE), int(mujoco.mjtJoint.mjJNT_SLIDE))
     found = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_JOINT, name)
     if found < 0:
-        hinges = [
-            model.joint(k).name for k in range(model.njnt) if model.jnt_type[k] == int(mujoco.mjtJoint.mjJNT_HINGE)
-        ]
+        known = [model.joint(k).name for k in range(model.njnt) if model.jnt_type[k] in moved]
         raise InputError(
-            f"joint {shown(name)}: is not in the model; {did_you_mean(name, hinges, f'its hinges are {listed(hinges)}')}"
+            f"joint {shown(name)}: is not in the model; {did_you_mean(name, known, f'its hinges and slides are {listed(known)}')}"
         )
-    if model.jnt_type[found] != int(mujoco.mjtJoint.mjJNT_HINGE):
-        raise InputError(f"joint {name!r}: is no hinge; a drive turns a hinge")
+    if model.jnt_type[found] not in moved:
+        raise InputError(f"joint {name!r}: is neither a hinge nor a slide, which drives move")
     return int(found)
+
+
+def is_slide(model: mujoco.MjModel, joint: int) -> bool:
+    """Whether a joint moves along a line."""
+    import mujoco
+
+    return bool(model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_SLIDE))
+
+
+def refuse_slide(model: mujoco.MjModel, name: str, who: str) -> None:
+    """Refuse a joint that moves along a line, for what takes hinges alone."""
+    if is_slide(model, joint_id(model, name)):
+        raise InputError(f"joint {name!r}: is a slide, and {who} is for hinges; lm.mujoco.attach takes slides")
 
 
 def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:

@@ -22,7 +22,7 @@ from ..model.springs import Spring
 from ..model.torsion import LinearStiffness, Rigid
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import Driven
-from .joints import acts, actuator_name, actuators_of, compiled, joint_id
+from .joints import acts, actuator_name, actuators_of, compiled, joint_id, refuse_slide
 
 if TYPE_CHECKING:
     import mujoco
@@ -116,6 +116,7 @@ def from_mjcf(
     need("mujoco", "lostmotion.mujoco", "mujoco")
 
     model = compiled(model)
+    refuse_slide(model, joint, "from_mjcf")
     number = joint_id(model, joint)
     dof = model.jnt_dofadr[number]
     actuators = actuators_of(model, number)

@@ -30,7 +30,8 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
 
     Raises InputError: the drive has such, and it is not to be replaced.
     """
-    weights = weights_of(name, drive) if weighs else []
+    inclined = inclination_of(name, drive)
+    weights = inclined or (weights_of(name, drive) if weighs else [])
     keys = [*loads_of(drive), *weights]
     if keys and not replace:
         raise InputError(
@@ -40,6 +41,8 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
         )
     if not weights:
         return drive  # load torques of scenarios are not used
+    if inclined:
+        return drive.replace(**dict.fromkeys(inclined, 0.0))
     changed = {
         table: Named({key: part for key, part in getattr(drive, table).items() if f"{table}.{key}" not in weights})
         for table in {key.partition(".")[0] for key in weights}
@@ -63,6 +66,13 @@ def weights_of(name: str, drive: Scenario) -> list[str]:
     torques = [(key, part) for key, part in train.on_shafts() if isinstance(part, PeriodicTorque)]
     shaft = output_of(name, train)
     return [key for key, part in torques if part.shaft == shaft and _turns_once(part)]  # type: ignore[attr-defined]
+
+
+def inclination_of(name: str, drive: Scenario) -> list[str]:
+    """Key of the inclination of the slide of a joint, whose weight is a load of the scenario."""
+    shaft = output_of(name, drive.train())
+    slide = drive.tables.slides.get(shaft)
+    return [drive.key_in_file(f"slides.{shaft}.inclination")] if slide is not None and slide.inclination != 0.0 else []
 
 
 def _turns_once(torque: PeriodicTorque) -> bool:

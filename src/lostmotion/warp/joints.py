@@ -12,7 +12,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.validation import listed, shown
 from ..mujoco.attaching import drive_of_joint
-from ..mujoco.joints import acts, compiled, joint_id
+from ..mujoco.joints import acts, compiled, refuse_slide
 from ..mujoco.overlaps import clear, without_weight
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives
@@ -41,7 +41,7 @@ class Joints:
 
         self._wp, self._data, self._step = wp, d, float(model.opt.timestep)
         self._worlds = d.qvel.shape[0]
-        joints = {name: joint_id(model, name) for name in drives}
+        joints = {name: model.joint(name).id for name in drives}
         own = m.dof_armature.numpy()
         m.dof_armature = wp.array(
             np.ascontiguousarray(np.broadcast_to(own, (self._worlds, model.nv))), dtype=wp.float32
@@ -281,7 +281,7 @@ def attach(
     gains = _gains(drives, stiffness, damping)
     made = {}
     for name, given in drives.items():
-        joint_id(robot, name)
+        refuse_slide(robot, name, "lm.warp.attach")
         scenario = without_weight(name, drive_of_joint(name, given, None), replace=False, weighs=weighs)
         clear(robot, name, scenario, replace=False)
         kinds = {motor.kind for motor in scenario.train().motors.values()}

@@ -232,7 +232,9 @@ class TrainTables(ScenarioTables, LinearElements):
         return " ".join(f"{name}: {note}" if len(told) > 1 else str(note) for name, note in told.items())
 
     def of_inertia(self, shaft: str, inertia: float) -> dict[str, Any]:
-        """The tables that change with another inertia of a shaft."""
+        """The tables that change with another inertia of a shaft, or another mass of a slide."""
+        if shaft in self.slides:
+            return {"slides": {**self.slides, shaft: self.slides[shaft].model_copy(update={"mass": inertia})}}
         return {"shafts": {**self.shafts, shaft: self.shafts[shaft].model_copy(update={"inertia": inertia})}}
 
     def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:

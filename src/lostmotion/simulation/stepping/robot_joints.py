@@ -117,15 +117,20 @@ class JointDrive:
         return twists, capacities
 
 
-def joint_drive(name: str, drive: Driven, inertia: float, step: float) -> JointDrive:
-    """A drive for a joint, with the inertia [kg·m²] of what the joint moves in place of the load's own.
+def joint_drive(name: str, drive: Driven, inertia: float, step: float, *, slides: bool = False) -> JointDrive:
+    """A drive for a joint, with the inertia [kg·m²] or mass [kg] of what the joint moves in place of the load's own.
 
-    Raises InputError: it is not clear which shaft the joint is, or it is a slide; another inertia than that of the
-        robot moves with it; an element needs a command that `step` does not give.
+    slides: whether the joint moves along a line.
+
+    Raises InputError: it is not clear which shaft the joint is, or the joint turns and the shaft slides, or the other way; another
+        inertia than that of the robot moves with it; an element needs a command that `step` does not give.
     """
     scenario = Scenario.of_any(drive)
     train = scenario.train()
     shaft = output_of(name, train)
+    if train.is_slide(shaft) != slides:
+        joint, part = ("slide", "slide") if slides else ("hinge", "shaft that turns")
+        raise InputError(f"joint {name!r}: is a {joint}, and the train ends at {shaft!r}; it needs a {part} there")
     _check_commands(name, scenario)
     if mass := next((key for key, mass in train.mass_matrices.items() if shaft in mass.shafts), None):
         raise InputError(
@@ -171,7 +176,7 @@ def _check_commands(name: str, scenario: Scenario) -> None:
 
 
 def output_of(name: str, train: DriveTrain) -> str:
-    """The end of the train, which turns no other shaft: the shaft of a joint; of several the one with the name of the joint."""
+    """The end of the train, which moves no other shaft: that of a joint; of several the one with the name of the joint."""
     joined = [(gear.input, gear.output) for gear in train.gears.values()]
     joined += [(one, other) for one, other, _ in train.held_together()]
     inner, turned = (
@@ -184,10 +189,7 @@ def output_of(name: str, train: DriveTrain) -> str:
         raise InputError(
             f"joint {name!r}: the train ends at {listed(ends) or 'no shaft'}; call the shaft of the joint {name!r}"
         )
-    (shaft,) = found
-    if train.is_slide(shaft):
-        raise InputError(f"joint {name!r}: is a hinge, and {shaft!r} is a slide; a hinge needs a shaft that turns")
-    return shaft
+    return found[0]
 
 
 class JointTrains:
@@ -293,12 +295,11 @@ class JointTrains:
         for k, drive in enumerate(self.drives):
             carried = held[k] - drive.own_torque(angles[k]) if k in held else 0.0
             twists, capacities = drive.twists_under(carried)
-            drive.simulation.reset(
-                TrainInitial(
-                    speeds={n: speeds[k] * r for n, r in drive.ratios().items()},
-                    angles={drive.shaft: angles[k]},
-                    twists=twists,
-                    hysteresis_capacities=capacities,
-                )
-            )
+            ratios, slide = drive.ratios(), drive.train.is_slide
+            state: dict[str, Any] = {
+                "speeds": {n: speeds[k] * r for n, r in ratios.items() if not slide(n)},
+                "slide_speeds": {n: speeds[k] * r for n, r in ratios.items() if slide(n)},
+                "positions" if slide(drive.shaft) else "angles": {drive.shaft: angles[k]},
+            }
+            drive.simulation.reset(TrainInitial(**state, twists=twists, hysteresis_capacities=capacities))
         self.read()
