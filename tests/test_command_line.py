@@ -491,7 +491,7 @@ def test_a_run_of_a_million_samples_is_drawn_in_seconds() -> None:
         for line in axes.lines:
             assert len(line.get_xdata()) <= thinning.MAX_POINTS + 10
     drawn = figure.axes[4].lines[0].get_ydata()
-    assert np.max(drawn) == pytest.approx(1e3 * float(result["twist"].max()), rel=1e-15)
+    assert np.max(drawn) == pytest.approx(10800.0 / np.pi * float(result["twist"].max()), rel=1e-15)
 
 
 @pytest.mark.skipif(not Path("/proc/self").exists(), reason="there is no /proc")

@@ -25,7 +25,7 @@ from lostmotion.reports.run import run_report
 from lostmotion.reports.servo import servo_report
 from lostmotion.reports.static import svg_of
 from lostmotion.reports.thinning import simplified
-from lostmotion.units.practical import practical
+from lostmotion.units.practical import ARCMIN, practical
 from lostmotion.verdict import Verdict
 
 X = np.geomspace(1.0, 1000.0, 50)
@@ -206,8 +206,8 @@ def test_a_run_is_reported_with_the_numbers_of_its_dataset(tmp_path: Path) -> No
     found = {chart["title"]: chart for chart in charts(page)}
     (error,) = found["Measured following error"]["lines"]
     wanted = result["position_reference"].values - result["measured_position"].values
-    assert np.array_equal(error["y"], 1e3 * wanted)
-    assert np.array_equal(found["Twist"]["lines"][0]["y"], 1e3 * result["twist"].values)
+    assert np.array_equal(error["y"], ARCMIN * wanted)
+    assert np.array_equal(found["Twist"]["lines"][0]["y"], ARCMIN * result["twist"].values)
     modes = {row["label"]: row["modes"] for row in found["Contacts"]["rows"]}
     assert np.array_equal(modes["input"], result["input_contact"].values)
     assert found["Energy of the whole run"]["energies"] == lm.energy_of(result)

@@ -6,6 +6,7 @@ import { format } from "./units";
 
 type Range = [number, number];
 const NEAR = 24; // pixels, within which a point is told
+const UNIT = / ?\[([^\]]*)\]$/; // behind the name of a quantity
 const KEYS = "Arrow keys move the cursor, plus and minus zoom, Escape shows all.";
 
 export class LinesChart {
@@ -30,8 +31,7 @@ export class LinesChart {
     private readonly arrays: Packed["arrays"],
   ) {
     const title = place.closest("figure")!.querySelector("b")!.textContent!;
-    place.classList.remove("still");
-    place.replaceChildren();
+    place.classList.remove("still"); // its picture stays, for paper
     place.setAttribute("tabindex", "0");
     place.setAttribute("role", "group");
     place.setAttribute("aria-label", `${title}. ${KEYS}`);
@@ -57,6 +57,11 @@ export class LinesChart {
     this.plot.draw(this.chart());
   }
 
+  /** Draws also where nobody sees it: a chart without a picture, on paper. */
+  paint(): void {
+    this.plot.picture();
+  }
+
   /** Shows a part of the x axis; none: all of it. */
   show(range: Range = this.whole): void {
     this.seen = range;
@@ -70,10 +75,11 @@ export class LinesChart {
     this.plot.mark(x ?? NaN);
     const values = this.lines.map((line) => (x === undefined ? NaN : line.y[nearest(line.x, x)]!));
     for (const reading of this.readings)
-      reading.textContent = x === undefined ? "" : format(values[Number(reading.dataset.line)]!, 4);
+      reading.textContent = x === undefined ? "" : measured(this.data.y.label, values[Number(reading.dataset.line)]!);
     if (x === undefined) return;
     const alone = this.lines.length === 1 && this.readings.length === 0;
-    this.say(alone ? `${format(x)}: ${format(values[0]!, 4)}` : format(x), this.plot.place(x, NaN)[0], 4);
+    const there = named(this.data.x.label, x);
+    this.say(alone ? `${there}: ${named(this.data.y.label, values[0]!)}` : there, this.plot.place(x, NaN)[0], 4);
   }
 
   private chart(): Chart {
@@ -134,7 +140,8 @@ export class LinesChart {
     this.plot.mark(NaN);
     if (!near && this.ground) {
       const [x, y] = this.plot.valuesAt(left, top);
-      this.say(`${format(x, 3)}, ${format(y, 3)}: ${format(this.ground(x, y), 4)}`, left, top);
+      const at = `${named(this.data.x.label, x, 3)}, ${named(this.data.y.label, y, 3)}`;
+      this.say(`${at}: ${named(this.data.ground!.label, this.ground(x, y))}`, left, top);
     }
     if (!near) return;
     const { x, y, label } = this.lines[found.line]!;
@@ -142,7 +149,8 @@ export class LinesChart {
     const name = this.data.lines[found.line]!.names?.[found.k] ?? (this.lines.length > 1 ? label : "");
     const [a, b] = this.plot.place(value, other);
     this.plot.mark(value, other);
-    this.say(`${name ? `${name}: ` : ""}${this.data.x.names?.[value] ?? format(value)}, ${format(other)}`, a, b);
+    const across = this.data.x.names?.[value] ?? named(this.data.x.label, value);
+    this.say(`${name ? `${name}: ` : ""}${across}, ${named(this.data.y.label, other)}`, a, b);
   }
 
   private say(text: string, left: number, top: number): void {
@@ -197,6 +205,16 @@ export class LinesChart {
     const ends: Range = this.data.x.logarithmic ? [low / factor, high * factor] : [low - half, high + half];
     return [Math.max(this.whole[0], ends[0]), Math.min(this.whole[1], ends[1])];
   }
+}
+
+/** A value with the name and the unit of its axis: frequency 3.05 Hz. */
+function named(label: string, value: number, digits = 4): string {
+  return `${label.replace(UNIT, "")} ${measured(label, value, digits)}`.trim();
+}
+
+function measured(label: string, value: number, digits = 4): string {
+  const unit = UNIT.exec(label)?.[1] ?? "";
+  return `${format(value, digits)} ${unit === "-" ? "" : unit}`.trim();
 }
 
 function middle([low, high]: Range, logarithmic: boolean): number {

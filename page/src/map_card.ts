@@ -30,7 +30,7 @@ export class MapCard {
       const [fastest, [low, high]] = [extent([x])[1], extent([y])];
       const top = Math.max(0.02, 1.15 * fastest);
       const reach = Math.max(0.02, 1.15 * Math.max(-low, high));
-      this.of(gear.name, d.gears.length > 1).plot.draw({
+      this.of(gear, d.gears.length > 1).plot.draw({
         x: { label: "speed / rated speed", unit: "1", range: [0, top] },
         y: { label: "load / rated torque", unit: "1", range: [-reach, reach] },
         lines: [...(pinned ? [line(working(d, gear, pinned), true)] : []), line({ x, y }, false)],
@@ -47,12 +47,15 @@ export class MapCard {
     }
   }
 
-  private of(name: string, several: boolean): { plot: Plot; reading: HTMLElement } {
+  private of(gear: Located, several: boolean): { plot: Plot; reading: HTMLElement } {
+    const { name } = gear;
     let found = this.plots.get(name);
     if (!found) {
       const [place, reading] = [h("div", { class: "plot" }), h("output", {})];
       const title = several ? `Loss map: ${words(name)}` : "Loss map";
-      const entry = h("span", { class: "entry" }, "loss coefficient here ", reading, "; the darker, the higher");
+      const [low, high] = extent([gear.losses.values.flat()]).map((v) => format(v, 3));
+      const bar = h("span", { class: "scale", role: "img", "aria-label": "to" });
+      const entry = h("span", { class: "entry" }, "loss coefficient here ", reading, `; ${low} `, bar, ` ${high}`);
       this.root.append(h("figure", {}, h("figcaption", {}, h("b", {}, title), entry), place));
       found = { plot: new Plot(place, `${title}: the working point over speed and load`), reading };
       this.plots.set(name, found);

@@ -32,7 +32,7 @@ export interface LinesData {
   spans: [number, number][];
   marks: { x: number; y: number; to?: number; text: string; colour: string }[];
   level?: number;
-  ground?: { x: number; y: number; values: number };
+  ground?: { x: number; y: number; values: number; label: string };
   /** segments of two points with NaN behind each, and the point at which the value is written */
   contours?: { text: string; x: number; y: number; label: [number, number] }[];
 }

@@ -17,7 +17,6 @@ class Contacts implements Drawn {
     private readonly data: ContactsData,
     private readonly arrays: Packed["arrays"],
   ) {
-    place.replaceChildren();
     this.strip = new Strip(place);
     new ResizeObserver(() => this.draw()).observe(place);
     this.draw();
@@ -47,7 +46,7 @@ function join(all: Drawn[][]): void {
 type Theme = "light" | "dark";
 
 /** Light or dark: as the system has it, until the button is pressed; paper is light. */
-function themes(root: HTMLElement, redraw: () => void): void {
+function themes(root: HTMLElement, redraw: () => void, print: () => void): void {
   const system = matchMedia("(prefers-color-scheme: dark)");
   const { dataset } = document.documentElement;
   const now = (): Theme => (dataset.theme as Theme | undefined) ?? (system.matches ? "dark" : "light");
@@ -65,6 +64,7 @@ function themes(root: HTMLElement, redraw: () => void): void {
   addEventListener("beforeprint", () => {
     before = dataset.theme as Theme | undefined;
     use("light");
+    print();
   });
   addEventListener("afterprint", () => use(before));
   root.append(button);
@@ -77,7 +77,12 @@ async function main(): Promise<void> {
     [...group.querySelectorAll<HTMLElement>("[data-chart]")].flatMap((place) => drawn(place, data)),
   );
   join(groups);
-  themes(document.getElementById("actions")!, () => groups.flat().forEach((chart) => chart.draw()));
+  const all = groups.flat();
+  themes(
+    document.getElementById("actions")!,
+    () => all.forEach((chart) => chart.draw()),
+    () => all.forEach((chart) => chart instanceof LinesChart && chart.paint()),
+  );
   performance.mark("drawn");
 }
 

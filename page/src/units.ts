@@ -17,9 +17,15 @@ export interface Shown {
   factor: number;
 }
 
+/** Angles below this are in arcmin, as backlash and twist are everywhere. */
+const SMALL_ANGLE = 0.1;
+
 /** The unit in which values up to `largest` read well. */
 export function shown(unit: string, largest: number): Shown {
   const written = WRITTEN[unit] ?? unit;
+  if (unit === "rad" && largest > 0) {
+    return largest < SMALL_ANGLE ? { unit: "arcmin", factor: Math.PI / 10800 } : { unit, factor: 1 };
+  }
   if (written === "" || largest === 0 || !Number.isFinite(largest)) return { unit: written, factor: 1 };
   const allowed = /^(rad|m\b)/.test(written) ? PREFIXES.slice(1) : PREFIXES;
   const [factor, prefix] = allowed.find(([f]) => largest >= f) ?? allowed.at(-1)!;

@@ -69,7 +69,7 @@ def response(
     numbers (bode.csv, response.csv, characteristics.csv, and response.nc where NetCDF is installed).
 
     \b
-    lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 -o bode
+    lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 --refine 0.2 -o bode
     lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
     pictures = pictures_of(figures, output)

@@ -46,6 +46,14 @@ def track(
             help='Whole angle of view of an axis, e.g. "motor=6.65 deg"; default: the angle of view of its camera.',
         ),
     ] = None,
+    limit: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--limit",
+            metavar="MOTOR=ANGLE",
+            help='Largest permitted error of an axis, e.g. "motor=10 urad"; the verdict compares the peak with it.',
+        ),
+    ] = None,
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
@@ -55,7 +63,7 @@ def track(
     and over the speed of the target, their contributions, and the influence of wrong losses, temperature and wear.
 
     \b
-    lostmotion track tracking-loss-map
+    lostmotion track tracking-loss-map --limit "motor=10 urad"
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o track
     """
     from ..errors import InputError
@@ -65,17 +73,22 @@ def track(
     loaded = load_scenario(scenario, overrides)
     from ..pointing.budget import pointing_budget, runs_of, units_of_axes
 
-    angles: dict[str, float | str] = {}
     units = units_of_axes(loaded)
-    for text in view or ():
-        motor, equals, angle = text.partition("=")
-        if not equals:
-            raise InputError(f'--view: "{text}" must be MOTOR=ANGLE, such as "motor=6.65 deg"')
-        name, angle = motor.strip(), angle.strip()
-        angles[name] = angle if (bare := as_number(angle)) is None else bare
-        print_bare(f"--view {name}", angle, units.get(name))
+
+    def by_motor(option: str, given: list[str] | None) -> dict[str, float | str]:
+        angles: dict[str, float | str] = {}
+        for text in given or ():
+            motor, equals, angle = text.partition("=")
+            if not equals:
+                raise InputError(f'{option}: "{text}" must be MOTOR=ANGLE, such as "motor=6.65 deg"')
+            name, angle = motor.strip(), angle.strip()
+            angles[name] = angle if (bare := as_number(angle)) is None else bare
+            print_bare(f"{option} {name}", angle, units.get(name))
+        return angles
+
+    seen, permitted = by_motor("--view", view), by_motor("--limit", limit)
     with about(scenario), progress(runs_of(loaded), "Runs") as step:
-        budget = pointing_budget(loaded, after=after, view=angles, progress=step)
+        budget = pointing_budget(loaded, after=after, view=seen, limit=permitted, progress=step)
     _print_summary(loaded.title or Path(scenario).stem, budget)
     if output is None:
         print(f"All charts on a page: lostmotion track {again(scenario, overrides)} -o track")
@@ -110,4 +123,8 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     console(sys.stdout, 160).print(table)
     print(f"  {budget.after_line}")
     if budget.view is not None:
-        print(f"  {view_line(budget)}\nVerdict: {verdict_of(budget)}")
+        print(f"  {view_line(budget)}")
+    if (verdict := verdict_of(budget)) is not None:
+        print(f"Verdict: {verdict}")
+    else:
+        print('  No limit was given; --limit "MOTOR=ANGLE" asks for a verdict.')

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
 
@@ -92,6 +92,8 @@ class PointingBudget:
     """unit of each axis: rad, or m of a slide"""
     view: View | None = None
     """view, if a field of view is given or cameras have one"""
+    limits: Mapping[str, float] = field(default_factory=dict)
+    """largest permitted error [rad, m] of axes that have one"""
 
     def contributions(self, axis: str) -> dict[str, float]:
         """By how much the mean square error of an axis falls [rad², m²] with each cause as all are taken away one after another.
@@ -108,6 +110,7 @@ def pointing_budget(
     *,
     after: float | str | None = None,
     view: Mapping[str, float | str] | None = None,
+    limit: Mapping[str, float | str] | None = None,
     robustness: bool = True,
     progress: Callable[[], None] | None = None,
 ) -> PointingBudget:
@@ -129,6 +132,8 @@ def pointing_budget(
         agree to a tenth of the rms error, or as far as they do in the second half.
     view : mapping of str to float or str, optional
         Full angle of view [rad, of a slide m] of each axis, by the name of its motor. Default: the angles of view of the cameras.
+    limit : mapping of str to float or str, optional
+        Largest permitted error [rad, of a slide m] of an axis, by the name of its motor. The verdict compares the peak with it.
     robustness : bool
         Whether to run other temperatures, target speeds, wear, and wrong losses in the controller, too.
     progress : callable, optional
@@ -142,7 +147,7 @@ def pointing_budget(
     Raises
     ------
     InputError
-        An axis has no controller with a reference of the position, or `view` names no axis.
+        An axis has no controller with a reference of the position, or `view` or `limit` names no axis.
     SolverError
         A run has no continuation.
 
@@ -162,7 +167,9 @@ def pointing_budget(
         if given is None
         else (given, f"errors count from {given:.4g} s on, as given")
     )
-    angles = _view(loaded, view or {})
+    cameras = {motor: c.camera.field for motor, c in loaded.axes().items() if c.camera is not None}
+    seen = view or {motor: angle for motor, angle in cameras.items() if angle is not None}
+    angles, limits = _angles(loaded, "view", seen), _angles(loaded, "limit", limit or {})
     cases = _cases(loaded, robustness=robustness)
     changed: dict[Case, Scenario] = {}
     known = {loaded: _numbers(as_it_is, start)}
@@ -202,6 +209,7 @@ def pointing_budget(
         {m: c.camera.pixel for m, c in loaded.axes().items() if c.camera is not None and c.camera.pixel is not None},
         units_of_axes(loaded),
         _in_view(time >= start, errors, angles) if angles else None,
+        limits,
     )
 
 
@@ -287,19 +295,18 @@ def _check(scenario: Scenario, after: float) -> None:
         )
 
 
-def _view(scenario: Scenario, view: Mapping[str, float | str]) -> dict[str, float]:
-    for motor in view:
+def _angles(scenario: Scenario, name: str, given: Mapping[str, float | str]) -> dict[str, float]:
+    """Angles or lengths above 0 of axes, which the argument of this name gives."""
+    for motor in given:
         if motor not in scenario.axes():
             names = ", ".join(scenario.axes())
             meant = did_you_mean(motor, scenario.axes(), f"the motors with a controller are {names}")
-            raise InputError(f"view: {shown(motor)} is the motor of no axis; {meant}")
-    cameras = {motor: c.camera.field for motor, c in scenario.axes().items() if c.camera is not None}
-    view = view or {motor: angle for motor, angle in cameras.items() if angle is not None}
+            raise InputError(f"{name}: {shown(motor)} is the motor of no axis; {meant}")
     units = units_of_axes(scenario)
-    angles = {motor: argument(f"view[{motor}]", angle, units[motor]) for motor, angle in view.items()}
+    angles = {motor: argument(f"{name}[{motor}]", angle, units[motor]) for motor, angle in given.items()}
     for motor, angle in angles.items():
         if not angle > 0.0:
-            raise InputError(f"view[{motor}]: {angle:g} {units[motor]} must be above 0")
+            raise InputError(f"{name}[{motor}]: {angle:g} {units[motor]} must be above 0")
     return angles
 
 

@@ -21,7 +21,7 @@ from ..model.losses import LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_factor
-from ..units.practical import printed
+from ..units.practical import ARCMIN, printed
 from .looks import FAINT, MEASURED, PALETTE, look
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report, write_text
@@ -356,7 +356,7 @@ def _laws(result: IdentificationResult, table: dict[str, dict[str, np.ndarray]])
             panels.append(Panel(f"losses of {name}", output, f"lost at the output [{unit}]", curves))
         if curves := loop_curves(train, name, table):
             what, title = (
-                ("deflection [µm]", "stiffness") if train.is_slide(gear.output) else ("twist [mrad]", "torsion")
+                ("deflection [µm]", "stiffness") if train.is_slide(gear.output) else ("twist [arcmin]", "torsion")
             )
             panels.append(Panel(f"{title} of {name}", what, output, curves))
     return panels
@@ -401,9 +401,9 @@ def friction_curve(scenario: Scenario, name: str, label: str) -> Curve | None:
 
 
 def loop_curves(train: DriveTrain, gear: str, table: dict[str, dict[str, np.ndarray]]) -> tuple[Curve, ...]:
-    """Torque of a gear over its twist [mrad] in the first logs, or force over deflection [µm], by the names of the logs."""
+    """Torque of a gear over its twist [arcmin] in the first logs, or force over deflection [µm], by the names of the logs."""
     twist, torque = train.twist_of(gear), train.output_torque_of(gear)
-    factor = 1e6 if train.is_slide(train.gears[gear].output) else 1e3
+    factor = 1e6 if train.is_slide(train.gears[gear].output) else ARCMIN
     runs = [(log, run) for log, run in table.items() if twist in run and torque in run][:LOOPS]
     return tuple(Curve(_short(log), factor * run[twist], run[torque], look(k)) for k, (log, run) in enumerate(runs))
 

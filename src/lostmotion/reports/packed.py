@@ -95,7 +95,12 @@ def _panel(panel: Panel, pack: Packed) -> dict[str, Any]:
         out["level"] = panel.level
     if (ground := panel.ground) is not None:
         values = np.asarray(ground.values, float)
-        grid = {"x": pack.add(ground.x), "y": pack.add(ground.y), "values": pack.add(values.ravel())}
+        grid = {
+            "x": pack.add(ground.x),
+            "y": pack.add(ground.y),
+            "values": pack.add(values.ravel()),
+            "label": ground.label,
+        }
         out["ground"] = grid
         out["contours"] = [
             {"text": c.text, "x": pack.add(c.x), "y": pack.add(c.y), "label": list(c.label)} for c in panel.contours()

@@ -214,7 +214,7 @@ def _legend(chart: Chart) -> str:
             for k, c in shown
         ]
         if chart.ground is not None:
-            found.append(f'<span class="entry">{escape(scale_of(chart.ground))}</span>')
+            found.append(f'<span class="entry">{scale_of(chart.ground)}</span>')
         return "".join(found)
     if isinstance(chart, Bars) and chart.series:
         boxes = [
@@ -233,11 +233,12 @@ def _legend(chart: Chart) -> str:
 
 
 def scale_of(ground: Ground) -> str:
-    """Legend of the shades of a map."""
+    """Legend of the shades of a map: its colour bar between the least and the largest value."""
     values = ground.values[np.isfinite(ground.values)]
     if len(values) == 0:
         return "no values"
-    return f"{ground.label}: {values.min():.3g} to {values.max():.3g}, the darker, the higher"
+    low, high = f"{values.min():.3g}", f"{values.max():.3g}"
+    return f'{escape(ground.label)} {low} <span class="scale" role="img" aria-label="to"></span> {high}'
 
 
 def _matrix(chart: Matrix) -> str:

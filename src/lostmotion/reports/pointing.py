@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..pointing.budget import Errors, PointingBudget, PointingError
-from ..units.practical import excess
+from ..units.practical import ROUNDING as ROUNDED
+from ..units.practical import excess, told_apart
 from ..verdict import Point, Verdict
 from .looks import look
 from .page import Prose, Report, Table
@@ -178,19 +179,29 @@ def _bars(budget: PointingBudget) -> Group:
 
 
 def verdict_of(budget: PointingBudget) -> Verdict | None:
-    """Whether the target stays in view, where there is an angle of view."""
-    if budget.view is None:
-        return None
-    out = 1.0 - budget.view.share
-    if out > 0.0:
-        point = Point("does not fit", f"the target is out of view for {excess(out)} of the time")
-    else:
-        point = Point("fits", "the target is in view all the time")
-    return Verdict.of([point])
+    """Whether errors keep their limits and the target stays in view, where there are limits or an angle of view."""
+    points = [_limit_point(budget, axis, limit) for axis, limit in budget.limits.items()]
+    if budget.view is not None and budget.view.share < 1.0:
+        points.append(
+            Point("does not fit", f"the target is out of view for {excess(1.0 - budget.view.share)} of the time")
+        )
+    elif budget.view is not None:
+        points.append(Point("fits", "the target is in view all the time"))
+    return Verdict.of(points) if points else None
+
+
+def _limit_point(budget: PointingBudget, axis: str, limit: float) -> Point:
+    factor, unit = _unit(budget, axis)
+    misses = budget.whole[axis].peak > limit * (1.0 + ROUNDED)
+    peak, most = told_apart(factor * budget.whole[axis].peak, factor * limit, misses)
+    if misses:
+        over = excess(budget.whole[axis].peak / limit - 1.0)
+        return Point("does not fit", f"{axis}: peak error {peak} {unit}, {over} above its limit of {most} {unit}")
+    return Point("fits", f"{axis}: peak error {peak} {unit}, within its limit of {most} {unit}")
 
 
 def _verdict(budget: PointingBudget) -> Verdict | tuple[str, ...]:
-    """Whether the target stays in view; the error of each axis, and what causes most of it."""
+    """Verdict on limits and view; the error of each axis, and what causes most of it."""
     errors, causes = [], []
     for axis, e in budget.whole.items():
         factor, unit = _unit(budget, axis)
@@ -207,7 +218,9 @@ def _verdict(budget: PointingBudget) -> Verdict | tuple[str, ...]:
     lines = [f"Error, {'; '.join(errors)}; {budget.after_line}."]
     lines += [f"Largest contribution, {'; '.join(causes)}."] if causes else []
     found = verdict_of(budget)
-    return tuple(lines) if found is None else replace(found, lines=(*found.lines, *lines))
+    if found is None:
+        return *lines, 'No limit was given; `--limit "MOTOR=ANGLE"` asks for a verdict.'
+    return replace(found, lines=(*found.lines, *lines))
 
 
 BUDGET = (

@@ -22,7 +22,10 @@ from .panels import Curve, Ground, Group, Panel
 if TYPE_CHECKING:
     import xarray
 
-BLANK = "A blank cell means that the curve does not reach this level within the frequencies."
+BLANK = (
+    "The gain is then 3 dB below that at the lowest frequency, the phase at -180 degrees. "
+    "A blank cell means that the curve does not reach this level within the frequencies."
+)
 
 
 def for_file(response: xarray.Dataset) -> xarray.Dataset:
@@ -122,8 +125,12 @@ def amplitude_lines(found: xarray.Dataset) -> list[str]:
     lines = []
     for a in found["amplitude"].values:
         band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
-        text = [f"-3 dB at {band:.4g} Hz" if math.isfinite(band) else "-3 dB outside the frequencies, or no motion"]
-        text += [f"-180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
+        text = [
+            f"gain -3 dB at {band:.4g} Hz"
+            if math.isfinite(band)
+            else "gain -3 dB outside the frequencies, or no motion"
+        ]
+        text += [f"phase -180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
         lines.append(f"amplitude {a:g}: {', '.join(text)}")
     return [*lines, *dead_zone_line(found)]
 
@@ -193,7 +200,9 @@ def response_report(responses: Mapping[str, xarray.Dataset], scenario: Scenario,
     caption = f"First harmonic of the {output.replace('_', ' ')} over that of the {source}, of periodic motions."
     compared = f" Compared with {', '.join(list(responses)[1:])}." if len(responses) > 1 else ""
     parts: list[Table | Group | Prose] = [
-        Table("Characteristics", (f"amplitude [{unit}]", "-3 dB [Hz]", "-180 degrees [Hz]"), rows, BLANK),
+        Table(
+            "Characteristics", (f"amplitude [{unit}]", "gain -3 dB at [Hz]", "phase -180 degrees at [Hz]"), rows, BLANK
+        ),
         Prose("Motions", motion_lines(response), listed=True),
     ]
     if grounds := maps(response, output):

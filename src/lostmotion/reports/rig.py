@@ -12,7 +12,7 @@ from ..model.torsion import Rigid
 from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
 from ..test_rig.virtual_rig import LOST_MOTION_LOAD
-from ..units.practical import RPM, counted, practical
+from ..units.practical import ARCMIN, RPM, counted, practical
 from ..verdict import Point, Verdict
 from .looks import DOTS, step
 from .page import Prose, Report, Table
@@ -53,14 +53,14 @@ def _torsion_panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel
     if report.initial_loading is None:
         return []
     twist, torque = report.initial_loading
-    torsion = [Curve("rig, first loading", 1e3 * twist, torque, step(0, 4))]
+    torsion = [Curve("rig, first loading", ARCMIN * twist, torque, step(0, 4))]
     if sheet is not None:
         torsion += _printed_torsion(sheet)
     loops = [
-        Curve(f"±{loop.amplitude:.3g} N·m", 1e3 * loop.twist, loop.torque, step(k, 4))
+        Curve(f"±{loop.amplitude:.3g} N·m", ARCMIN * loop.twist, loop.torque, step(k, 4))
         for k, loop in enumerate(report.loops)
     ]
-    angle, output, rated = "twist [mrad]", "output torque [N·m]", report.gearbox.rated_output_torque
+    angle, output, rated = "twist [arcmin]", "output torque [N·m]", report.gearbox.rated_output_torque
     return [
         Panel("torsion, input locked", angle, output, tuple(torsion)),
         Panel(f"hysteresis loops (rated {rated:g} N·m)", angle, output, tuple(loops)),
@@ -95,7 +95,7 @@ def _printed_torsion(sheet: GearboxSheet) -> list[Curve]:
     if sheet.stiffness is None or not sheet.stiffness.torques:
         return []
     twist = 0.5 * (sheet.backlash or 0.0) + np.array(sheet.stiffness.breaks())
-    return [Curve("catalogue T1, T2", 1e3 * twist, np.array(sheet.stiffness.torques), DOTS)]
+    return [Curve("catalogue T1, T2", ARCMIN * twist, np.array(sheet.stiffness.torques), DOTS)]
 
 
 def summary_rows(report: RigReport) -> list[tuple[str, str]]:

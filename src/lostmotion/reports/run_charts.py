@@ -15,7 +15,7 @@ from ..model.losses import LossMap
 from ..model.train import DriveTrain
 from ..simulation.runs.results import energy_of, scenario_of
 from ..simulation.runs.separate_trains import parts_of
-from ..units.practical import charted
+from ..units.practical import ARCMIN, charted
 from .looks import FAINT, look
 from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
 
@@ -216,9 +216,9 @@ def gear_charts(result: xarray.Dataset) -> list[Panel]:
         twist, torque, speed = train.twist_of(name), train.output_torque_of(name), train.speed_of(gear.input)
         if gear.stiffness.kind != "rigid" and twist in result and torque in result:
             linear = train.is_slide(gear.output)
-            loop = Curve(name, (1e6 if linear else 1e3) * result[twist].values, result[torque].values, look(0))
+            loop = Curve(name, (1e6 if linear else ARCMIN) * result[twist].values, result[torque].values, look(0))
             title = f"{'Deflection' if linear else 'Torsion'} and hysteresis of {name}"
-            labels = ("deflection [µm]", "output force [N]") if linear else ("twist [mrad]", "output torque [N·m]")
+            labels = ("deflection [µm]", "output force [N]") if linear else ("twist [arcmin]", "output torque [N·m]")
             found.append(Panel(title, *labels, (loop,)))
         if isinstance(gear.losses, LossMap) and gear.housing is None and speed in result and torque in result:
             found.append(_working(name, gear, result[speed].values, result[torque].values))

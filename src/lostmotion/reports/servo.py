@@ -24,9 +24,9 @@ HEADER = (
     "loop",
     "regime",
     "stable",
-    "-3 dB [Hz]",
-    "-90 deg [Hz]",
-    "with feedforward, -3 dB [Hz]",
+    "closed loop -3 dB at [Hz]",
+    "closed loop -90 deg at [Hz]",
+    "with feedforward, -3 dB at [Hz]",
     "gain margin [dB]",
     "gain margin at [Hz]",
     "phase margin [deg]",
@@ -111,30 +111,62 @@ def _step_panel(step: StepResponse) -> Panel:
 
 
 def _panel(
-    report: ServoReport, loop: str, title: str, label: str, y: Callable[[LoopSheet], np.ndarray], **options: Any
+    report: ServoReport,
+    loop: str,
+    title: str,
+    label: str,
+    y: Callable[[LoopSheet], np.ndarray],
+    told: Callable[[LoopSheet], str] | None = None,
+    **options: Any,
 ) -> Panel:
     rows = [row for row in report.loops if row.loop == loop]
-    curves = tuple(Curve(row.regime, row.frequency, y(row), look(k)) for k, row in enumerate(rows))
+    legends = [", ".join(filter(None, (row.regime, told(row) if told else ""))) for row in rows]
+    curves = tuple(
+        Curve(row.regime, row.frequency, y(row), look(k), legend)
+        for k, (row, legend) in enumerate(zip(rows, legends, strict=True))
+    )
     return Panel(f"{loop} loop, {title}", "frequency [Hz]", label, curves, log_x=True, **options)
 
 
 def _open_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
-    """Gain and phase of the loop that is cut, with margins and crossovers."""
+    """Gain and phase of the loop that is cut, with margins and crossovers, whose values are in the legends."""
     rows = [row for row in report.loops if row.loop == loop]
     at_gain, at_phase = [], []
     for k, row in enumerate(rows):
         m = row.margins
         if math.isfinite(m.crossover):
-            at_gain.append(Mark(m.crossover, 0.0, f"{m.crossover:.3g} Hz", look(k)))
+            at_gain.append(Mark(m.crossover, 0.0, "", look(k)))
             # At the crossover the loop is -exp(j margin) or its conjugate; its side follows from its neighbours.
             side = np.interp(m.crossover, row.frequency, np.imag(-row.open_loop))
             margin = math.copysign(DEGREES * m.phase_margin, side)
-            at_phase.append(Mark(m.crossover, margin - 180.0, f"{abs(margin):.3g}°", look(k), to=-180.0))
+            at_phase.append(Mark(m.crossover, margin - 180.0, "", look(k), to=-180.0))
         if m.gain_margin > 0.0 and math.isfinite(m.gain_margin):
-            margin = decibels(m.gain_margin)
-            at_gain.append(Mark(m.gain_margin_frequency, -margin, f"{margin:.3g} dB", look(k), to=0.0))
-    gain = _panel(report, loop, "open: gain", "|L| [dB]", lambda r: _gain(r.open_loop), marks=tuple(at_gain), level=0.0)
-    return gain, _phase_panel(report, loop, "open", lambda r: r.open_loop, marks=tuple(at_phase), level=-180.0)
+            at_gain.append(Mark(m.gain_margin_frequency, -decibels(m.gain_margin), "", look(k), to=0.0))
+    gain = _panel(
+        report,
+        loop,
+        "open: gain",
+        "|L| [dB]",
+        lambda r: _gain(r.open_loop),
+        _gain_told,
+        marks=tuple(at_gain),
+        level=0.0,
+    )
+    phase = _phase_panel(
+        report, loop, "open", lambda r: r.open_loop, told=_phase_told, marks=tuple(at_phase), level=-180.0
+    )
+    return gain, phase
+
+
+def _gain_told(row: LoopSheet) -> str:
+    crossover, margin = row.margins.crossover, decibels(row.margins.gain_margin)
+    crosses = f"crosses at {crossover:.3g} Hz" if math.isfinite(crossover) else ""
+    return ", ".join(filter(None, (crosses, f"margin {margin:.3g} dB" if math.isfinite(margin) else "")))
+
+
+def _phase_told(row: LoopSheet) -> str:
+    margin = DEGREES * row.margins.phase_margin
+    return f"margin {margin:.3g}°" if math.isfinite(margin) else ""
 
 
 def _closed_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:

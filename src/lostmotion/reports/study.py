@@ -134,20 +134,25 @@ def _label(table: pa.Table, column: str) -> str:
     return printed(labelled(table, column))
 
 
+def _words(name: str) -> str:
+    """A name as a title has it."""
+    return name.replace("_", " ").replace(".", " ")
+
+
 def distributions(table: pa.Table, study: Study) -> Group:
     """A histogram of each kept value."""
-    charts = [Histogram(name, _label(table, name), x) for name in study.keep if len(x := _finite(table, name))]
-    return Group("distributions", "Distributions", "", tuple(charts))
+    charts = [Histogram(_words(name), _label(table, name), x) for name in study.keep if len(x := _finite(table, name))]
+    return Group("distributions", "Distributions", "", tuple(charts), 3 if len(charts) % 3 == 0 else 2)
 
 
 def bars(name: str, title: str, values: dict[str, dict[str, Any]], label: str, series: tuple[str, ...] = ()) -> Group:
     """Bars by parameter for each kept value, the longest on top (tornado); pairs as two bars."""
     limits = None if series else (-1.0, 1.0)
     charts = [
-        Bars(kept, label, {p: v if isinstance(v, tuple) else (v,) for p, v in by.items()}, series, limits)
+        Bars(_words(kept), label, {p: v if isinstance(v, tuple) else (v,) for p, v in by.items()}, series, limits)
         for kept, by in values.items()
     ]
-    return Group(name, title, "", tuple(charts), min(2, len(charts)))
+    return Group(name, title, "", tuple(charts), 3 if len(charts) % 3 == 0 else min(2, len(charts)))
 
 
 def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Group:
@@ -162,7 +167,9 @@ def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Group:
             curve = Curve("runs", np.asarray(places, float), some[name].to_numpy(), POINTS)
             names = v.names if v.names is not None else ()
             across, along = (_label(table, column) for column in (v.title, name))
-            charts.append(Panel(f"{name} over {v.title}", across, along, (curve,), x_names=tuple(names)))
+            charts.append(
+                Panel(f"{_words(name)} over {_words(v.title)}", across, along, (curve,), x_names=tuple(names))
+            )
     return Group("scatter", "Values over parameters", "", tuple(charts), min(3, len(vary)))
 
 
