@@ -193,6 +193,7 @@ bench: $(VENV)/dev fmu-library
 docs: $(VENV)/dev page
 	$(BIN)/pip install -q "lostmotion[docs]"
 	$(BIN)/python docs/generate.py
+	$(BIN)/python docs/live_pages.py
 	$(BIN)/sphinx-build -q -W --keep-going -b html docs docs/_build
 
 lint: $(VENV)/dev

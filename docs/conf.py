@@ -18,13 +18,9 @@ release = re.findall(
 version = release
 extensions = [
     "myst_nb",  # pages in Markdown, and notebooks, which are executed
-    "sphinx.ext.autodoc",
-    "sphinx.ext.napoleon",
-    "sphinx.ext.viewcode",
     "sphinx_copybutton",
-    "sphinx_design",
 ]
-myst_enable_extensions = ["dollarmath", "colon_fence"]
+myst_enable_extensions = ["dollarmath"]
 nb_execution_mode = "force"
 nb_execution_raise_on_error = True
 nb_execution_timeout = 300
@@ -39,10 +35,6 @@ html_css_files = ["pages.css"]
 exclude_patterns = ["_build", "jupyter_execute"]
 html_extra_path = ["_generated/extra"]
 html_show_sourcelink = True
-autodoc_typehints = "description"
-autodoc_member_order = "bysource"
-autodoc_mock_imports: list[str] = []
-napoleon_numpy_docstring = True
 suppress_warnings = ["myst.header", "mystnb.unknown_mime_type"]
 smartquotes = False  # commands are shown as they are typed
 html_math_renderer = "mathml"
@@ -59,13 +51,6 @@ def display_math(self: HTML5Translator, node: nodes.math_block) -> None:
     raise nodes.SkipNode
 
 
-def keep_colons(_app: Sphinx, what: str, _name: str, _item: object, _options: object, lines: list[str]) -> None:
-    """Napoleon takes what stands before a colon in the first line of an attribute's text for its type."""
-    if what in ("attribute", "data", "property"):
-        lines[:0] = ["..", ""]  # an empty comment
-
-
 def setup(app: Sphinx) -> None:
-    app.connect("autodoc-process-docstring", keep_colons, priority=400)  # Napoleon's is 500.
     # Formulas as MathML: the pages need no script from elsewhere.
     app.add_html_math_renderer("mathml", (inline_math, None), (display_math, None))

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
+from PIL import Image
+
 from lostmotion.reports import plots
 from lostmotion.reports.panels import Panel
 
@@ -12,3 +14,8 @@ from lostmotion.reports.panels import Panel
 def save(panels: Sequence[Panel], columns: int, size: tuple[float, float], out: Path, name: str) -> None:
     """Draws panels into a file."""
     plots.draw(panels, columns, size).savefig(out / f"{name}.png", dpi=100, metadata={"Software": None})
+
+
+def smaller(path: Path) -> None:
+    """Writes a picture again with 32 colours, which takes a quarter of the space and is enough for curves."""
+    Image.open(path).convert("RGB").quantize(32, dither=Image.Dither.NONE).save(path, optimize=True)

@@ -1,17 +1,22 @@
-"""Writes the pages of the documentation that are made from the code: scenario reference, variables, commands, gallery."""
+"""Writes the pages of the documentation that are made from the code: keys, variables, commands, functions, gallery.
+
+`python docs/generate.py` writes them into `docs/reference`, and draws pictures of the gallery that are missing. With
+`--pictures` it also draws all pictures again, which takes ten minutes and needs MuJoCo. `make docs` calls it.
+"""
 
 from __future__ import annotations
 
 import inspect
+import sys
 from collections.abc import Iterable, Iterator, Mapping
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
 
+import api_pages
 import control_figures
 import identification_figures
 import limit_cycles_figures
-import live_pages
 import motors_figures
 import reference_figures
 import robots_figures
@@ -19,21 +24,21 @@ import self_locking_figures
 import servo_figures
 import tracking_figures
 import two_motors_figures
+from figure_files import smaller
 from typer.main import get_command
 
 import lostmotion as lm
 from lostmotion.cli import app
 from lostmotion.control import references
-from lostmotion.inputs.part import Part
 from lostmotion.inputs.schema import options, unit_in_schema
 from lostmotion.model import signals
-from lostmotion.namespace import homes_of
 from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.simulation.forms.train_tables import train_schema
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.units.grammar import PREFIXED, SPELLINGS
 
-OUT = Path(__file__).parent / "_generated"
+OUT = Path(__file__).parent / "reference"
+IMAGES = Path(__file__).parent / "images"
 WRITERS = (
     reference_figures,
     self_locking_figures,
@@ -315,121 +320,36 @@ def topic_of(name: str) -> str:
     return found[0]
 
 
-def gallery(out: Path) -> str:
-    """The page with a thumbnail of each shipped scenario, by topic; pages and figures go into the directory `gallery` of `out`."""
-    pages = out / "gallery"
-    pages.mkdir(exist_ok=True)
+def gallery() -> str:
+    """The page with a picture of each shipped scenario, by topic."""
     lines = [
         "# Gallery of scenarios",
         "",
         "This page is for those who look for a scenario to start from. It shows each scenario that is shipped, by topic.",
         "",
-        "Run a scenario by its name, change it with `--set`, or name it as the `base` of your own file.",
-        "Those called paper-... are the runs of [the paper](../citing.md#the-paper).",
+        "Run a scenario by its name (`lostmotion run NAME --plot run.png`), change it with `--set`, copy it by `lostmotion new NAME`, or name it",
+        "as the `base` of your own file. Those called paper-... are the runs of [the paper](../citing.md#the-paper).",
         "",
     ]
     scenarios = lm.shipped_scenarios()
-    for name, path in scenarios.items():
-        scenario = lm.load(name)
-        lm.simulate(scenario).lm.plot().savefig(pages / f"{name}.png", dpi=80, metadata={"Software": None})
-        (pages / f"{name}.md").write_text("\n".join(scenario_page(name, scenario.title, path)), encoding="utf-8")
     for topic in TOPICS:
         names = [name for name in scenarios if topic_of(name) == topic]
-        if not names:
-            continue
-        lines += [f"## {topic}", "", "::::{grid} 2 3 3 4", ":class-container: gallery", ":gutter: 2", ""]
+        lines += [f"## {topic}", "", "| run | scenario |", "|---|---|"] if names else []
         for name in names:
-            lines += [f":::{{grid-item-card}} {name}", f":link: gallery/{name}", ":link-type: doc"]
-            lines += [f":img-top: gallery/{name}.png", f":img-alt: {lm.load(name).title}", ":::", ""]
-        lines += ["::::", ""]
-    lines += ["```{toctree}", ":hidden:", "", *(f"gallery/{name}" for name in scenarios), "```", ""]
+            title, file = lm.load(name).title, f"../../scenarios/{name}.toml"
+            shown = f"[`{name}`]({file}): **{title}.** {introduction(scenarios[name])}".replace("|", "\\|")
+            lines.append(f"| ![{title}](../images/gallery/{name}.png) | {shown} |")
+        lines += [""] if names else []
     return "\n".join(lines)
 
 
-def scenario_page(name: str, title: str, path: Path) -> list[str]:
-    """The page of one shipped scenario: what it shows, its command, its figure and its file."""
-    return [
-        f"# {name}",
-        "",
-        f"**{title}.** {introduction(path)}",
-        "",
-        "```sh",
-        f"lostmotion run {name} --plot {name}.png",
-        "```",
-        "",
-        f"![{title}]({name}.png)",
-        "",
-        "## The file",
-        "",
-        "```toml",
-        path.read_text(encoding="utf-8").strip(),
-        "```",
-        "",
-    ]
-
-
-def summary_of(thing: Any) -> str:
-    """First sentence of a docstring, for a table."""
-    text = " ".join((inspect.getdoc(thing) or "").split("\n\n")[0].split())
-    return text.replace("``", "`").replace("|", "\\|")
-
-
-def api_page(dotted: str) -> str:
-    """The page of one public name, `servo.tune` for example; the fields of a part with units, ranges and defaults."""
-    thing: Any = lm
-    for word in dotted.split("."):
-        thing = getattr(thing, word)
-    lines = [f"# lm.{dotted}", "", "```{eval-rst}"]
-    if not inspect.isclass(thing):
-        kind = "autofunction" if callable(thing) else "autodata"
-        return "\n".join([*lines, f".. {kind}:: lostmotion.{dotted}", "```", ""])
-    if issubclass(thing, BaseException):
-        return "\n".join([*lines, f".. autoexception:: lostmotion.{dotted}", "```", ""])
-    if not issubclass(thing, Part):
-        lines += [f".. autoclass:: lostmotion.{dotted}", "   :members:", "   :special-members: __getitem__", "```", ""]
-        return "\n".join(lines)
-    lines += [f".. autoclass:: lostmotion.{dotted}", "   :no-members:", "```", "", "## Fields", ""]
-    schema = thing.model_json_schema()
-    rows: list[str] = []
-    write_table("top level", schema, schema, rows, set())
-    return (
-        "\n".join([*lines, *rows[rows.index("| key | unit | range | default | meaning |") :]]).split("\n## `[")[0]
-        + "\n"
-    )
-
-
-def api_list(dotted: Iterable[str], prefix: str) -> str:
-    """Table of names with links to their pages, which `prefix` leads to, and the entries of the table of contents."""
-    lines = ["| name | purpose |", "|---|---|"]
-    names = list(dotted)
-    for name in names:
-        thing: Any = lm
-        for word in name.split("."):
-            thing = getattr(thing, word)
-        lines.append(f"| [`lm.{name}`]({prefix}{name}.md) | {summary_of(thing)} |")
-    return "\n".join([*lines, "", "```{toctree}", ":hidden:", "", *(prefix + name for name in names), "```", ""])
-
-
-def api(out: Path) -> None:
-    """One page for each public function and class, and a list for each namespace, into the directory `api` of `out`."""
-    pages = out / "api"
-    pages.mkdir(exist_ok=True)
-    flat = homes_of("lostmotion")
-    spaces = [name for name, home in flat.items() if home == "lostmotion"]
-    names = sorted(set(flat) - set(spaces) - {"__version__"}, key=str.lower)
-    kinds: dict[str, list[str]] = {"functions": [], "classes": [], "errors": []}
-    for name in names:
-        thing = getattr(lm, name)
-        kind = "classes" if inspect.isclass(thing) else "functions"
-        kinds["errors" if inspect.isclass(thing) and issubclass(thing, BaseException) else kind].append(name)
-    for kind, found in kinds.items():
-        (pages / f"{kind}.inc").write_text(api_list(found, "_generated/api/"), encoding="utf-8")
-    for space in spaces:
-        found = [f"{space}.{name}" for name in sorted(homes_of(f"lostmotion.{space}"), key=str.lower)]
-        (pages / f"{space}.inc").write_text(api_list(found, "../_generated/api/"), encoding="utf-8")
-        names += found
-    for name in names:
-        (pages / f"{name}.md").write_text(api_page(name), encoding="utf-8")
+def draw_gallery(out: Path, again: bool) -> None:
+    """The pictures of the gallery, those that are missing or all of them."""
+    out.mkdir(exist_ok=True)
+    for name in lm.shipped_scenarios():
+        if again or not (out / f"{name}.png").exists():
+            lm.simulate(lm.load(name)).lm.plot().savefig(out / f"{name}.png", dpi=45, metadata={"Software": None})
+            smaller(out / f"{name}.png")
 
 
 def introduction(path: Path) -> str:
@@ -455,25 +375,26 @@ def collect(writers: Iterable[Any], out: Path) -> None:
                         f"{path.name}: written by {made[path.name]} and by {writer.__name__}; rename one"
                     )
                 made[path.name] = writer.__name__
+                if path.suffix == ".png":
+                    smaller(path)
                 path.replace(out / path.name)
 
 
-def generate(out: Path = OUT) -> None:
-    """All pages into a directory, made if missing."""
-    out.mkdir(exist_ok=True)
-    api(out)
-    pages = {
-        "scenario": scenario_reference(),
-        "train": train_reference(),
-        "variables": variables(),
-        "commands": commands(),
-        "gallery": gallery(out),
-    }
-    collect(WRITERS, out)
-    live_pages.write(out / "extra" / "live")
-    for name, text in pages.items():
-        (out / f"{name}.md").write_text(text, encoding="utf-8")
+def pages() -> Iterator[tuple[str, str]]:
+    """All pages, each with its place in `docs/reference`."""
+    yield "scenario.md", scenario_reference()
+    yield "train.md", train_reference()
+    yield "variables.md", variables()
+    yield "commands.md", commands()
+    yield "gallery.md", gallery()
+    yield "worm-gears.md", self_locking_figures.worm_page()
+    yield from ((f"api/{space}.md", text) for space, text in api_pages.pages())
 
 
 if __name__ == "__main__":
-    generate()
+    (OUT / "api").mkdir(parents=True, exist_ok=True)
+    for name, text in pages():
+        (OUT / name).write_text(text, encoding="utf-8")
+    if "--pictures" in sys.argv:
+        collect(WRITERS, IMAGES)
+    draw_gallery(IMAGES / "gallery", "--pictures" in sys.argv)

@@ -13,3 +13,7 @@ def write(directory: Path) -> None:
     directory.mkdir(parents=True, exist_ok=True)
     for name in PAGES:
         write_page(directory / f"{name}.html", lm.load(name))
+
+
+if __name__ == "__main__":
+    write(Path(__file__).parent / "_generated" / "extra" / "live")

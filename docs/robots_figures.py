@@ -18,7 +18,7 @@ from lostmotion.reports.panels import Curve, Panel
 
 EXAMPLES = Path(__file__).parent.parent / "examples"
 KINDS = {"strain wave": LOOKS[0], "ideal": LOOKS[1], "quasi-direct": LOOKS[2]}
-FRAME, FRAMES_FROM, SECONDS_A_FRAME = 10, 1000, 0.04  # steps of the trot
+FRAME, FRAMES_FROM, SECONDS_A_FRAME = 20, 1000, 0.08  # steps of the trot
 
 
 def example(name: str) -> Any:
@@ -136,8 +136,8 @@ def trot(out: Path, runs: dict[str, Any]) -> None:
             0.99, 0.02, "a quarter of real time; grey: ideal joints; arrows: ground forces", ha="right", color=MUTED
         )
         png = io.BytesIO()
-        figure.savefig(png, format="png", dpi=100)
-        frames.append(Image.open(png).convert("RGB").quantize(48, dither=Image.Dither.NONE))
+        figure.savefig(png, format="png", dpi=65)
+        frames.append(Image.open(png).convert("RGB").quantize(16, dither=Image.Dither.NONE))
     path, milliseconds = out / "robots-trot.gif", round(1e3 * SECONDS_A_FRAME)
     frames[0].save(path, save_all=True, append_images=frames[1:], duration=milliseconds, loop=0, optimize=True)
 
@@ -150,10 +150,3 @@ def write(out: Path) -> None:
     trots, squats = ({kind: legged.move(kind, gait, 2.0) for kind in KINDS} for gait in ("trot", "squat"))
     quadruped(out, trots, squats)
     trot(out, trots)
-
-
-if __name__ == "__main__":
-    from generate import OUT
-
-    OUT.mkdir(exist_ok=True)
-    write(OUT)

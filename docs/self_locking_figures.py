@@ -236,6 +236,12 @@ def boundary(eta_b: float) -> float:
     return math.sqrt(low * high)
 
 
+def worm_page() -> str:
+    """The page of the shipped worm gears."""
+    about = "This page is for those who select a worm gear. [Self-locking](../self-locking.md#the-worm-gears-of-the-catalogue) describes the columns."
+    return f"# Worm gears of the catalogue\n\n{about}\n\n{worm_table()}"
+
+
 def worm_table() -> str:
     """The shipped worm gears: what is said of each."""
     lines = [
@@ -268,8 +274,7 @@ def worm_values(record: Any) -> dict[str, Any]:
 
 
 def write(out: Path) -> None:
-    """All of the page's figures and its table into a directory."""
+    """All of the page's figures into a directory."""
     histories(out)
     three_degrees(out)
     chatter_map(out)
-    (out / "worm-gears.inc").write_text(worm_table(), encoding="utf-8")

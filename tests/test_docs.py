@@ -132,23 +132,67 @@ def generate(monkeypatch: pytest.MonkeyPatch) -> Any:
     return importlib.import_module("generate")
 
 
-def test_figures_of_pages_leave_the_gallery_alone_and_are_written_once(
-    generate: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """A figure of a page may have the name of a scenario, as `tracking-camera` has; two modules may not share a name."""
-
+def test_two_modules_cannot_write_one_picture(generate: Any, tmp_path: Path) -> None:
     def writer(name: str) -> Any:
-        return SimpleNamespace(__name__=name, write=lambda out: (out / "worm-lowering.png").write_text(name))
+        return SimpleNamespace(__name__=name, write=lambda out: (out / "worm-lowering.svg").write_text(name))
 
-    shipped = {"worm-lowering": lm.shipped_scenarios()["worm-lowering"]}
-    monkeypatch.setattr(lm, "shipped_scenarios", lambda: shipped)
-    page = generate.gallery(tmp_path)
     generate.collect([writer("one")], tmp_path)
-    (picture,) = re.findall(r":img-top: (.*)", page)
-    assert (tmp_path / picture).read_bytes().startswith(b"\x89PNG")
-    assert (tmp_path / "worm-lowering.png").read_text() == "one"
-    with pytest.raises(FileExistsError, match=r"worm-lowering\.png: written by one and by other"):
+    assert (tmp_path / "worm-lowering.svg").read_text() == "one"
+    with pytest.raises(FileExistsError, match=r"worm-lowering\.svg: written by one and by other"):
         generate.collect([writer("one"), writer("other")], tmp_path)
+
+
+def test_committed_pages_are_those_that_the_code_makes(generate: Any) -> None:
+    made = dict(generate.pages())
+    for name, text in made.items():
+        shown = (generate.OUT / name).read_text(encoding="utf-8")
+        assert shown == text, f"docs/reference/{name} is old: run python docs/generate.py"
+    assert {p.relative_to(generate.OUT).as_posix() for p in generate.OUT.rglob("*.md")} == set(made)
+
+
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").rglob("*.md"))]
+PAGES = [page for page in PAGES if not {"_build", "_generated"} & set(page.parts)]
+
+
+def without_code(text: str) -> str:
+    return re.sub(r"```.*?```|`[^`\n]*`", lambda code: "`x`" if "\n" not in code[0] else "", text, flags=re.S)
+
+
+def anchors_of(page: Path, anchors: Any) -> set[str]:
+    """Fragments of the headings of a page, as GitHub and the site make them."""
+    lines = re.sub(r"```.*?```", "", page.read_text(encoding="utf-8"), flags=re.S).splitlines()
+    headings = [line.lstrip("# ") for line in lines if re.match("#+ ", line)]
+    return set(anchors([re.sub(r"\[([^]]*)\]\([^)]*\)", r"\1", heading) for heading in headings]))
+
+
+def links_of(page: Path) -> list[str]:
+    found = re.findall(r"\]\(([^()\s]+)\)", without_code(page.read_text(encoding="utf-8")))
+    return [link for link in found if not re.match(r"https?:|mailto:", link)]
+
+
+@pytest.mark.parametrize("page", PAGES, ids=[page.relative_to(ROOT).as_posix() for page in PAGES])
+def test_each_link_and_picture_of_a_page_is_in_the_checkout(page: Path, generate: Any) -> None:
+    tracked = {ROOT / name for name in git("ls-files", "--cached", "--others", "--exclude-standard").splitlines()}
+    directories = {parent for path in tracked for parent in path.parents}
+    for link in links_of(page):
+        name, _, anchor = link.partition("#")
+        target = (page.parent / name).resolve() if name else page
+        assert target in tracked | directories, f"{link}: no such file"
+        assert not anchor or anchor in anchors_of(target, generate.api_pages.anchors), f"{link}: no such heading"
+    if page.name != "contributing.md":  # the site's copy of CONTRIBUTING.md
+        assert "{include}" not in page.read_text(), "text that a checkout does not show"
+
+
+def git(*words: str) -> str:
+    return subprocess.run(["git", *words], cwd=ROOT, capture_output=True, text=True, check=True).stdout
+
+
+def test_pictures_are_few_small_and_shown(generate: Any) -> None:
+    shown = {(page.parent / link).resolve() for page in PAGES for link in links_of(page)}
+    pictures = {path for path in (ROOT / "docs" / "images").rglob("*.*") if path.suffix != ".py"}
+    assert pictures <= shown
+    assert {p.stem for p in (generate.IMAGES / "gallery").glob("*.png")} == set(lm.shipped_scenarios())
+    assert sum(path.stat().st_size for path in pictures) < 1.6e6
 
 
 def test_every_shipped_scenario_has_a_topic_in_the_gallery(generate: Any) -> None:

@@ -1,9 +1,9 @@
 """The Python interface: what takes a scenario, what can be pickled, shown and plotted, what is exported."""
 
 import copy
-import importlib
 import inspect
 import pickle
+import pydoc
 import re
 import threading
 import timeit
@@ -377,27 +377,34 @@ def test_what_functions_return_is_exported() -> None:
         assert not missing, f"{name} gives {missing}"
 
 
-def test_every_exported_name_has_its_page(tmp_path, monkeypatch) -> None:
-    monkeypatch.syspath_prepend(ROOT / "docs")
-    generate = importlib.import_module("generate")
-    generate.api(tmp_path)
-    names = set(PATHS.values()) - {"__version__"}
-    assert {path.stem for path in (tmp_path / "api").glob("*.md")} == names
-    for name in names:
-        page = (tmp_path / "api" / f"{name}.md").read_text()
-        assert f":: lostmotion.{name}\n" in page
+def test_every_exported_name_is_in_the_reference_with_its_fields() -> None:
+    pages = {path.stem: path.read_text() for path in (ROOT / "docs" / "reference" / "api").glob("*.md")}
+    assert set(pages) == {*NAMESPACES, "lostmotion"}
+    for name in set(PATHS.values()) - {"__version__"}:
+        space, _, _ = name.rpartition(".")
+        section = pages[space or "lostmotion"].split(f"\n## `lm.{name}`\n")[1].split("\n## ")[0]
         for key in getattr(public(name.split(".")[-1]), "model_fields", {}):
-            assert f"| `{key}` |" in page, f"{name} lacks {key}"
-    listed = "".join(path.read_text() for path in (tmp_path / "api").glob("*.inc"))
-    assert set(re.findall(r"\| \[`lm\.([\w.]+)`\]", listed)) == names
+            assert f"`{key}`" in section, f"{name} lacks {key}"
     assert re.fullmatch(r"\d+\.\d+\.\d+.*", lm.__version__)
 
 
+@pytest.mark.parametrize("name", [name for name in PATHS if hasattr(public(name), "model_fields")])
+def test_help_shows_the_parameters_of_a_part_and_nothing_of_pydantic(name: str) -> None:
+    part = public(name)
+    shown = pydoc.plain(pydoc.render_doc(part))
+    for key in part.model_fields:
+        assert re.search(rf"^ \|  {key}\b", shown, re.M)
+    assert not [line for line in shown.splitlines() if re.search("pydantic(?!.main.BaseModel$)", line, re.I)]
+
+
+def test_help_states_unit_range_and_default() -> None:
+    shown = pydoc.plain(pydoc.render_doc(lm.Gearbox))
+    assert " |  inertia : kg·m², ≥ 0, default 0.0\n |      J_R, on the input shaft" in shown
+    assert " |  rated_output_torque : N·m, > 0, needed" in shown
+    assert shown.index("Parameters") < shown.index("Examples")
+
+
 # --- namespaces ---
-
-
-def test_each_namespace_has_a_page_in_the_documentation() -> None:
-    assert {p.stem for p in (ROOT / "docs" / "api").glob("*.md")} == set(NAMESPACES)
 
 
 def test_each_name_has_one_place() -> None:

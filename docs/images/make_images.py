@@ -1,7 +1,6 @@
 """Draws the pictures of README and tutorial: python docs/images/make_images.py"""
 
 import re
-import sys
 import tempfile
 from pathlib import Path
 
@@ -54,16 +53,8 @@ def selection(study: lm.studies.Study, name: str) -> None:
     figure.savefig(HERE / name, dpi=110, metadata={"Software": None})
 
 
-def tracking() -> None:
-    sys.path.insert(0, str(HERE.parent))
-    import tracking_figures
-
-    tracking_figures.over_amplitude(HERE)
-
-
 if __name__ == "__main__":
     why()
-    tracking()
     tutorial()
     examples = HERE.parents[1] / "examples"
     selection(lm.studies.load_study(examples / "select-gearbox.toml"), "selection.png")

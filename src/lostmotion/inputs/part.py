@@ -1,5 +1,6 @@
 """The base of all parts, tables and records that are given: immutable, and refused in one line."""
 
+import inspect
 import re
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -13,10 +14,11 @@ from ..errors import InputError
 from ..units.scalars import plain
 from .display import abridged
 from .docstrings import docstring_of
+from .parameters import PartType, written_docstring
 from .validation import refusal, shown
 
 
-class Part(BaseModel):
+class Part(BaseModel, metaclass=PartType):
     """Immutable; unknown keys, NaN and infinity are refused, with an `InputError` that says what would be right."""
 
     model_config = ConfigDict(extra="forbid", frozen=True, allow_inf_nan=False, defer_build=True)
@@ -29,8 +31,10 @@ class Part(BaseModel):
     def __get_pydantic_json_schema__(cls, schema: CoreSchema, handler: GetJsonSchemaHandler) -> dict[str, Any]:
         """The JSON Schema, with the docstrings of the fields as their descriptions."""
         described = handler(schema)
-        properties = handler.resolve_ref_schema(described).get("properties", {})
-        for name, node in properties.items():
+        table = handler.resolve_ref_schema(described)
+        if "description" in table and (text := written_docstring(cls)) is not None:
+            table["description"] = inspect.cleandoc(text)  # without the parameters, which are the properties
+        for name, node in table.get("properties", {}).items():
             if "description" not in node and (text := docstring_of(cls, name)) is not None:
                 node["description"] = text
         return described
