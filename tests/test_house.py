@@ -330,6 +330,7 @@ def test_help_names_every_command() -> None:
         "new",
         "check",
         "servo",
+        "steps",
         "track",
         "identify",
         "monitor",

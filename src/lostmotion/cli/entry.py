@@ -27,6 +27,7 @@ from . import (
     scenarios,
     select,
     servo,
+    steps,
     study,
     track,
 )
@@ -168,6 +169,7 @@ for command in (
     study.study,
     select.select,
     track.track,
+    steps.steps,
     identify.identify,
     monitor.monitor,
 ):
