@@ -20,8 +20,7 @@ from lostmotion.units.conversion import Unit
 # makes a synchronous motor a DC motor.
 # The line of a motor becomes its rated point.
 LINE = {"motor.stall_torque", "motor.no_load_speed", "motor.stall_current", "motor.no_load_current"}
-ELECTRIC = {f"motor.{key}" for key in ("rated_current", "resistance_phase", "inductance_phase", "supply_voltage")}  # of a stepper
-NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"} | LINE | ELECTRIC
+NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"} | LINE
 # A stiffness of the kind rigid has the flanks of a gear.
 OF_THE_CORE_ALONE = {"motor.command_limit", "gearbox.flanks.backlash", "gearbox.flanks.restitution"}
 

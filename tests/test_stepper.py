@@ -37,11 +37,11 @@ def frequency(error: float) -> float:
 
 
 def test_small_oscillations_have_the_frequency_of_the_field() -> None:
-    """sqrt(N T_H/J)/(2 pi). The chord through the rest has the slope of the sine but for h^2/48, which two widths h take away."""
+    """sqrt(N T_H/J)/(2 pi). The chord through the rest has the slope of the sine but for h^2/24, which two widths h take away."""
     exact = math.sqrt(N * T_H / J) / (2.0 * math.pi)
-    errors = [math.tan(math.pi / 8.0 / q) ** 2 for q in (40, 80)]
+    errors = [(math.pi / 4.0 / q / math.sin(math.pi / 4.0 / q)) ** 2 - 1.0 for q in (40, 80)]
     coarse, fine = (frequency(error * (1.0 + 1e-9)) for error in errors)
-    assert coarse / exact - 1.0 == pytest.approx((0.5 * math.pi / 40) ** 2 / 96.0, rel=1e-2)
+    assert coarse / exact - 1.0 == pytest.approx((0.5 * math.pi / 40) ** 2 / 48.0, rel=1e-2)
     assert fine + (fine - coarse) / 3.0 == pytest.approx(exact, rel=1e-9)
 
 
@@ -85,7 +85,8 @@ def test_the_motion_is_that_of_an_integration_of_the_sine() -> None:
     assert np.abs(lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11).motor_angle.values - exact).max() < 1e-6 / N
 
 
-@pytest.mark.parametrize("seed", range(4))
+# 43 and 69 pass near an unstable rest, which amplifies; 88 rests on a corner of the straight lines.
+@pytest.mark.parametrize("seed", [0, 1, 2, 3, 43, 69, 88])
 def test_random_axes_agree_with_the_adaptive_solver_within_the_error_of_the_straight_lines(seed: int) -> None:
     """Electrical angle, as the torque of the adaptive solver is the sine itself: off by a few times the share 1e-5."""
     assert departure(seed, 1e-5) < 2e-4
@@ -265,6 +266,35 @@ def test_lost_steps_are_those_of_an_integration_of_the_sine() -> None:
     assert np.abs(np.array(found.times) - t[at + 1]).max() < 3e-5
 
 
+@pytest.mark.parametrize("seed", range(40))
+def test_lost_steps_of_random_rotors_are_those_of_an_integration(seed: int) -> None:
+    """Fields too fast for the rotor: number and instants of its slips by DOP853 to 1e-12. What the straight lines leave grows by slips."""
+    draw = np.random.default_rng(seed)
+    natural = math.sqrt(N * T_H / J)
+    speed = natural / N * float(draw.uniform(1.5, 4.0))
+    viscous = math.sqrt(N * T_H * J) / N * float(draw.uniform(0.01, 0.2))
+    load, until = T_H * float(draw.uniform(-0.3, 0.3)), 40.0 / natural
+    scenario = alone(
+        {"ramps": [{"rise": speed * until, "duration": until}]},
+        torque=load,
+        viscous=viscous,
+        duration=until,
+        sample_interval=until / 400,
+        torque_error=1e-6 * T_H,
+    )
+    (found,) = lm.simulation.lost_steps(lm.simulate(scenario))
+
+    def rate(t, x):
+        return [x[1], (-T_H * math.sin(N * (x[0] - speed * t)) - viscous * x[1] - load) / J]
+
+    def slips(t, x):
+        return math.cos(0.5 * N * (x[0] - speed * t))
+
+    exact = solve_ivp(rate, (0.0, until), [0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-13, max_step=until / 400, events=slips)
+    assert len(found.times) == exact.t_events[0].size
+    assert np.array(found.times) == pytest.approx(exact.t_events[0], abs=1e-5 * until)
+
+
 def test_a_run_that_loses_steps_does_not_fit() -> None:
     from lostmotion.reports.run import summary, verdict_of
 
@@ -314,7 +344,9 @@ def test_a_mount_rests_while_its_worm_crosses_the_backlash() -> None:
     [
         ({}, "lost_steps", "ok"),
         ({"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8}, "lost_steps", "warning"),
-        ({}, "stepper_torque", "ok"),
+        ({}, "stepper_torque", "unknown"),
+        ({"axis.motor.supply_voltage": 24.0}, "stepper_torque", "ok"),
+        ({"axis.motor.supply_voltage": 3.0}, "lost_steps", "warning"),
         ({"axis.motor.supply_voltage": 3.0}, "stepper_torque", "warning"),
         ({"axis.motor.holding_torque": 0.12, "axis.motor.supply_voltage": 60.0}, "stepper_torque", "caution"),
         ({"command.stepping.microsteps": 1}, "step_resonance", "caution"),

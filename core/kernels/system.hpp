@@ -8,6 +8,7 @@
 #include "going_on.hpp"
 #include "lostmotion/model/scales.hpp"
 #include "lostmotion/model/switched_train.hpp"
+#include "lostmotion/parts/stepper_winding.hpp"
 #include "pack.hpp"
 
 namespace lostmotion::model {
@@ -95,9 +96,10 @@ class TrainSystem {
     void stop(Now& now, AtRest& at_rest) const {
         search_.stop(now, at_rest);
     }
-    // Inputs that depend on the state: what straight lines leave of smooth laws.
+    // Inputs that depend on the state: what straight lines leave of smooth laws, and windings of steppers.
     void set_remainders(const Key& key, const State& x, const typename D::Memory& memory, InputsOf<D>& u,
                         InputsOf<D>* rate = nullptr) const {
+        set_windings(x, u, rate);
         for (const auto& e : assembly_.places().acting) {
             if (e->remainder == nowhere) continue;
             const ShaftPlace& p = assembly_.places().shafts[static_cast<std::size_t>(e->shaft)];
@@ -111,6 +113,7 @@ class TrainSystem {
     }
     // The same for the search of the next regime, where no piece is known yet: the law is continuous.
     void set_remainders(InstantOf<D>& now) const {
+        set_windings(now.x, now.input[0], &now.input[1], &now.input_magnitudes);
         for (const auto& e : assembly_.places().acting) {
             if (e->remainder == nowhere) continue;
             ShaftInstant here = assembly_.places().instant_of(*e, now);
@@ -144,6 +147,24 @@ class TrainSystem {
     }
 
  private:
+    template <class Magnitudes = InputsOf<D>>
+    void set_windings(const State& x, InputsOf<D>& u, InputsOf<D>* rate = nullptr,
+                      Magnitudes* magnitudes = nullptr) const {
+        const Places& places = assembly_.places();
+        for (std::size_t m = 0; m < places.motors.size(); ++m) {
+            const MotorPlace& p = places.motors[m];
+            if (p.winding == nowhere) continue;
+            const StepperWinding winding{assembly_.train().motors[m].law};
+            const ShaftPlace& shaft = places.shafts[static_cast<std::size_t>(assembly_.train().motors[m].shaft)];
+            const double level = p.level == nowhere ? 1.0 : u[p.level];
+            const auto flow =
+                winding.flow({x[shaft.angle], x[shaft.speed], u[p.command], level, {x[p.current], x[p.current + 1]}});
+            u[p.winding] = flow.torque;
+            for (int k = 0; k < 2; ++k) u[p.winding + 1 + k] = flow.rate[static_cast<std::size_t>(k)];
+            if (rate != nullptr) (*rate)[p.winding] = flow.torque_rate;
+            if (magnitudes != nullptr) (*magnitudes)[p.winding] = winding.motor.holding_torque;
+        }
+    }
     Found certain(Found found) const {
         return search_.interruption.requested() ? Found::interrupted : overflowed_ ? Found::outside : found;
     }

@@ -33,6 +33,24 @@ class AdaptiveKernelIn final : public AdaptiveKernel {
                     double* out) const override;
 };
 
+// The driver of a stepper is on before a run begins.
+template <class D>
+void establish_currents(const model::Assembly& a, PackedRun<D>& run) {
+    for (std::size_t m = 0; m < a.places().motors.size(); ++m) {
+        const model::MotorPlace& p = a.places().motors[m];
+        if (p.winding == model::nowhere) continue;
+        const auto first = [&](int input) {
+            const Signal& signal = run.signals[static_cast<std::size_t>(input)];
+            double sum = signal.breakpoints[0].value;
+            for (const Sine& sine : signal.sines) sum += sine.at(0.0);
+            return sum;
+        };
+        const auto i = StepperWinding{a.train().motors[m].law}.wanted(first(p.command),
+                                                                      p.level == model::nowhere ? 1.0 : first(p.level));
+        for (int k = 0; k < 2; ++k) run.start.x[p.current + k] = i[static_cast<std::size_t>(k)];
+    }
+}
+
 template <class D>
 TrainReport AdaptiveKernelIn<D>::run(const TrainModel& model, const RunStart& start, const TrainOptions& options,
                                      double* out) const {
@@ -40,7 +58,8 @@ TrainReport AdaptiveKernelIn<D>::run(const TrainModel& model, const RunStart& st
     TrainReport report;
     report.message = check_run(model.assembly, start.start, options.control);
     if (!report.message.empty()) return report;
-    const PackedRun<D> c(model.assembly, start, options);
+    PackedRun<D> c(model.assembly, start, options);
+    establish_currents(model.assembly, c);
     TrainRecorder<D> recorder(model, options, out, report, nullptr);
     const System system(model.assembly);
     AdaptiveSolver<System> solver(system, c.signals, options.tolerance, system.rated_scale());

@@ -52,6 +52,7 @@ class TrainReader {
                 return;
             case TrainChannel::output: form(row(model_.assembly.controller_command(c.index, regime_.key))); return;
             case TrainChannel::error: form(row(model_.assembly.controller_error(c.index))); return;
+            case TrainChannel::field_lead: form(row(model_.assembly.field_lead(c.index))); return;
             case TrainChannel::pressing_torque:
                 form(row(model_.assembly.pressing_torque(c.index, regime_.key)));
                 return;

@@ -15,6 +15,7 @@ std::optional<model::Row> channel_form(const model::Assembly& a, const model::Re
         case TrainChannel::massless_speed: return r.massless[k].form;
         case TrainChannel::output: return a.controller_command(c.index, r.key);
         case TrainChannel::pressing_torque: return a.pressing_torque(c.index, r.key);
+        case TrainChannel::field_lead: return a.field_lead(c.index);
         case TrainChannel::error: return a.controller_error(c.index);
         default: return std::nullopt;
     }

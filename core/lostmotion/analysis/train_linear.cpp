@@ -83,6 +83,7 @@ LinearRegime linearize(const model::Assembly& a, const std::vector<TrainChannel>
         if (c.kind == Channel::contact_torque) add(c, r.contact_torque[k]);
         if (c.kind == Channel::output) add(c, a.controller_command(c.index, p.key));
         if (c.kind == Channel::pressing_torque) add(c, a.pressing_torque(c.index, p.key));
+        if (c.kind == Channel::field_lead) add(c, a.field_lead(c.index));
         if (c.kind == Channel::error) add(c, a.controller_error(c.index));
     }
     return out;

@@ -9,16 +9,16 @@ auto AngleTorqueOnShaft::angle(const Site& on) const -> Row {
 }
 
 auto AngleTorqueOnShaft::torque(const Site& on, const Key& key) const -> Row {
+    if (is_whole()) return on.terms.input(remainder);
     const int k = piece(key) % curve_.pieces();
     Row T = on.terms.one(curve_.at_zero(k)) + curve_.slope(k) * angle(on) - on.terms.memory(turn, curve_.slope(k));
-    T *= share(piece(key));
-    if (remainder != nowhere) T += on.terms.input(remainder);
-    return T;
+    return T *= share(piece(key));
 }
 
 void AngleTorqueOnShaft::add_guards(const Site& on, const Key& key, bool turns, std::vector<Guard>& guards) const {
-    const int k = piece(key), n = curve_.pieces();
-    if (turns || position != nowhere) add_piece_guards(on.terms, angle(on), curve_, turn, branch, key, guards);
+    const int k = piece(key), n = own_pieces();
+    if (!is_whole() && (turns || position != nowhere))
+        add_piece_guards(on.terms, angle(on), curve_, turn, branch, key, guards);
     if (!has_command()) return;
     const Row above = on.terms.input(command) - on.terms.one(full_current);
     guards.push_back({.form = k < n ? above : -above,
@@ -28,10 +28,8 @@ void AngleTorqueOnShaft::add_guards(const Site& on, const Key& key, bool turns, 
 }
 
 auto AngleTorqueOnShaft::remainder_at(const ShaftInstant& now, int branch) const -> Remainder {
-    const int k = branch % curve_.pieces();
     const double smooth = curve_.smooth(now.angle), current = share(branch);
-    return {current * (smooth - curve_.at_zero(k) - curve_.slope(k) * (now.angle - now.turn)),
-            current * (curve_.smooth_slope(now.angle) - curve_.slope(k)) * now.speed, std::fabs(smooth)};
+    return {current * smooth, current * curve_.smooth_slope(now.angle) * now.speed, std::fabs(smooth)};
 }
 
 }  // namespace lostmotion::model

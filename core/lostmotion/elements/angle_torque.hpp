@@ -29,7 +29,7 @@ class AngleTorqueOnShaft final : public ShaftElement {
         : ShaftElement(law.name, law.shaft), curve_(law.torque), motor_(motor), share_at_rest_(share_at_rest) {}
 
     const char* piecewise_law() const override { return "piece of the torque over angle"; }
-    int pieces() const override { return has_command() ? 2 * curve_.pieces() : curve_.pieces(); }
+    int pieces() const override { return has_command() ? 2 * own_pieces() : own_pieces(); }
     bool has_command() const override { return share_at_rest_ < 1.0; }
     int motor() const override { return motor_; }
     bool over_angle() const override { return true; }
@@ -42,7 +42,7 @@ class AngleTorqueOnShaft final : public ShaftElement {
     double torque(const ShaftInstant& now) const override { return share(next(0, now)) * curve_(now.angle); }
     int next(int, const ShaftInstant& now) const override {
         const bool reduced = has_command() && now.command < full_current;
-        return curve_.piece(now.angle - now.turn) + (reduced ? curve_.pieces() : 0);
+        return (is_whole() ? 0 : curve_.piece(now.angle - now.turn)) + (reduced ? own_pieces() : 0);
     }
     int locate_steady(double) const override { return motor_ == nowhere ? 0 : curve_.piece(0.5 * curve_.period()); }
     void add_guards(const Site& on, const Key& key, bool turns, std::vector<Guard>& guards) const override;
@@ -53,7 +53,10 @@ class AngleTorqueOnShaft final : public ShaftElement {
 
     Row angle(const Site& on) const;
     // In the branches beyond those of the curve the current is reduced.
-    double share(int k) const { return k < curve_.pieces() ? 1.0 : share_at_rest_; }
+    double share(int k) const { return k < own_pieces() ? 1.0 : share_at_rest_; }
+    // The adaptive solver takes a sine whole: the edges of straight lines would only cut its steps, and hold a rotor.
+    bool is_whole() const { return remainder != nowhere; }
+    int own_pieces() const { return is_whole() ? 1 : curve_.pieces(); }
 
     PeriodicCurve curve_;
     int motor_ = nowhere;

@@ -66,6 +66,12 @@ auto ElementForms::spring_torque(int gear, const Key& key) const -> Row {
            terms_.one(factor * g.law.curve.offset(piece));
 }
 
+auto ElementForms::field_lead(int motor) const -> Row {
+    const ShaftMotor& m = train_.motors[motor];
+    return m.law.pole_pairs() *
+           (terms_.input(places_.motors[motor].command) - terms_.state(places_.shafts[m.shaft].angle));
+}
+
 auto ElementForms::motor_terms(int motor) const -> Motor::Terms {
     const MotorPlace& p = places_.motors[motor];
     const int command = p.command == nowhere ? layout().one : layout().first_input + p.command;

@@ -87,6 +87,8 @@ class ElementForms {
     // Is the rate of the twist kept at zero?
     bool twist_rests(int gear, const Regime& r) const;
 
+    // Of a stepper, the electrical angle of its field before its rotor: n (phi* - phi).
+    Row field_lead(int motor) const;
     // What a controller takes.
     Row controller_signal(int k, const LinearController::Signal& signal) const;
     Row controller_error(int k) const {

@@ -50,8 +50,9 @@ void Equations::compose_motors(const Key& key, Regime& r) const {
     }
 }
 
-// Of a stepper, whose torque acts as a law over the angle.
+// Of a stepper, whose torque acts as a law over the angle, or is that of its winding.
 Row Equations::field_torque(int motor, const Key& key) const {
+    if (const int input = places_.motors[motor].winding; input != nowhere) return terms_.input(input);
     Row sum;
     for (const auto& e : places_.acting)
         if (e->motor() == motor) sum += e->torque(forms_.site(e->shaft), key);
@@ -130,7 +131,9 @@ Row Equations::net_torque(int shaft, const Key& key, const Regime& r) const {
     const ShaftPlace& p = places_.shafts[shaft];
     Row sum;
     for (std::size_t m = 0; m < train_.motors.size(); ++m)
-        if (train_.motors[m].shaft == shaft && train_.motors[m].law.kind != Motor::stepper) sum += r.motor_torque[m];
+        if (const Motor& law = train_.motors[m].law;
+            train_.motors[m].shaft == shaft && (law.kind != Motor::stepper || law.has_winding()))
+            sum += r.motor_torque[m];
     for (std::size_t g = 0; g < train_.gears.size(); ++g)
         if (train_.gears[g].output == shaft) sum += r.output_torque[g];
     for (const auto& c : places_.couplings)
@@ -223,6 +226,7 @@ void Equations::set_rates(const Key& key, Regime& r) const {
     for (std::size_t m = 0; m < train_.motors.size(); ++m) {
         const Motor& motor = train_.motors[m].law;
         const MotorPlace& p = places_.motors[m];
+        for (int k = 0; p.winding != nowhere && k < 2; ++k) r.rate[p.current + k] = terms_.input(p.winding + 1 + k);
         if (!motor.has_torque_state()) continue;
         const Motor::Terms terms = forms_.motor_terms(static_cast<int>(m));
         r.rate[p.torque] = p.controller == nowhere

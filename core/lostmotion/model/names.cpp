@@ -34,6 +34,9 @@ std::string angle_of(const Train& t, std::size_t shaft) {
 std::string motor_torque_of(const Train& t, std::size_t motor) {
     return result_name(t.motors[motor].name, "torque", is_slide(t, t.motors[motor].shaft));
 }
+std::string phase_current_of(const Train& t, std::size_t motor, int phase) {
+    return t.motors[motor].name + (phase == 0 ? "_phase_a_current" : "_phase_b_current");
+}
 std::string twist_of(const Train& t, std::size_t gear) { return gear_result(t, gear, "twist"); }
 const char* twist_meaning(const Train& t, std::size_t gear) {
     return is_slide(t, t.gears[gear].output) ? "angle of input/ratio less position of output"
@@ -69,7 +72,11 @@ std::vector<std::string> state_names(const Assembly& a) {
     const auto set = [&names](int state, const std::string& name) {
         if (state != nowhere) names[static_cast<std::size_t>(state)] = name;
     };
-    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].torque, motor_torque_of(t, k));
+    for (std::size_t k = 0; k < t.motors.size(); ++k) {
+        set(p.motors[k].torque, motor_torque_of(t, k));
+        if (const int i = p.motors[k].current; i != nowhere)
+            for (const int phase : {0, 1}) set(i + phase, phase_current_of(t, k, phase));
+    }
     for (std::size_t k = 0; k < t.shafts.size(); ++k) {
         set(p.shafts[k].speed, t.shafts[k].name + "_speed");
         set(p.shafts[k].angle, angle_of(t, k));
@@ -122,6 +129,7 @@ std::vector<std::string> input_names(const Assembly& a) {
         set(p.shafts[k].given_acceleration, t.shafts[k].name + "_given_acceleration");
     }
     for (const auto& e : p.acting) set(e->command, e->name + "_command");
+    for (std::size_t k = 0; k < t.motors.size(); ++k) set(p.motors[k].level, t.motors[k].name + "_current_command");
     for (const auto& c : p.couplings) set(c->command, c->name + "_command");
     for (std::size_t k = 0; k < t.controllers.size(); ++k) {
         set(p.controllers[k].reference, t.controllers[k].name + "_reference");

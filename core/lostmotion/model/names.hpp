@@ -22,6 +22,7 @@ std::string law_text(const Train& t, int shaft, std::string law);  // "torque ov
 std::string result_name(const std::string& element, std::string what, bool slide);
 std::string angle_of(const Train& t, std::size_t shaft);
 std::string motor_torque_of(const Train& t, std::size_t motor);
+std::string phase_current_of(const Train& t, std::size_t motor, int phase);  // of a stepper with a winding
 std::string twist_of(const Train& t, std::size_t gear);
 const char* twist_meaning(const Train& t, std::size_t gear);
 

@@ -35,6 +35,8 @@ std::vector<PeriodicAngle> periodic_angles(const Assembly& a) {
         for (const PeriodicAngle::Turn& t : angle.turns) periods.push_back(t.period);
         // A controller, a spring or the field of a stepper knows the angle itself, however often the shaft has turned.
         const bool known =
+            std::any_of(train.motors.begin(), train.motors.end(),
+                        [&](const ShaftMotor& m) { return m.shaft == angle.shaft && m.law.has_winding(); }) ||
             std::any_of(train.controllers.begin(), train.controllers.end(),
                         [&](const LinearController& c) { return c.takes_angle(angle.shaft); }) ||
             std::any_of(a.places().acting.begin(), a.places().acting.end(), [&](const auto& e) {

@@ -1,6 +1,9 @@
 #include "places.hpp"
 
 #include <functional>
+#include <utility>
+
+#include "../parts/stepper_winding.hpp"
 
 namespace lostmotion::model {
 
@@ -48,6 +51,9 @@ Places::Places(const Train& train, bool with_remainders)
         if (e->motor() != nowhere) e->position = motors[e->motor()].command;
         if (with_remainders && e->is_smooth()) e->remainder = layout.inputs++;
     }
+    for (std::size_t m = 0; m < motors.size(); ++m)
+        if (with_remainders && motors[m].current != nowhere)
+            motors[m].winding = std::exchange(layout.inputs, layout.inputs + StepperWinding::inputs);
     place_memory_and_branches(train);
     layout.arrange();
 }
@@ -61,13 +67,18 @@ void Places::place_states(const Train& train) {
             by_angle[g.input] = true;
             if (g.housing != nowhere) by_angle[g.housing] = true;
         }
-    std::size_t of_controllers = 0;
+    std::size_t further = 0;  // of windings and controllers
+    for (const ShaftMotor& m : train.motors)
+        if (m.law.has_winding()) {
+            by_angle[m.shaft] = true;
+            further += 2;
+        }
     for (const LinearController& c : train.controllers) {
         for (std::size_t s = 0; s < shafts.size(); ++s)
             if (c.takes_angle(static_cast<int>(s))) by_angle[s] = true;
-        of_controllers += c.states.size();
+        further += c.states.size();
     }
-    const bool all = motors.size() + shafts.size() + gears.size() + of_controllers +
+    const bool all = motors.size() + shafts.size() + gears.size() + further +
                          static_cast<std::size_t>(std::count(by_angle.begin(), by_angle.end(), true)) <=
                      smallest;
     int next = 0;
@@ -89,6 +100,8 @@ void Places::place_states(const Train& train) {
         controllers[k].first_state = next;
         next += static_cast<int>(train.controllers[k].states.size());
     }
+    for (std::size_t m = 0; m < motors.size(); ++m)
+        if (train.motors[m].law.has_winding()) motors[m].current = std::exchange(next, next + 2);
     layout.coupled = next;
     // Parts that hang together, by the last shaft of each.
     std::vector<int> last(shafts.size());
@@ -186,6 +199,9 @@ void Places::place_inputs(const Train& train) {
     }
     for (const auto& e : acting)
         if (e->has_command()) e->command = layout.inputs++;
+    for (std::size_t m = 0; m < motors.size(); ++m)
+        if (const Motor& law = train.motors[m].law; law.has_winding() && law.standstill_current < 1.0)
+            motors[m].level = layout.inputs++;
     for (const auto& c : couplings)
         if (c->has_command()) c->command = layout.inputs++;
     for (std::size_t k = 0; k < controllers.size(); ++k) {

@@ -25,6 +25,9 @@ struct MotorPlace {
     int command = nowhere;  // input, unless a controller gives it
     int branch = nowhere;
     int controller = nowhere;  // its number
+    // Of a stepper with a winding: the first of two states; the command of the current, an input; and the first of
+    // `StepperWinding::inputs` inputs of the adaptive solver.
+    int current = nowhere, level = nowhere, winding = nowhere;
 };
 // A law over the angle of an input shaft.
 struct OverAngle {

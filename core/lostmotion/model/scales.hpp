@@ -40,8 +40,12 @@ void controller_scale(const Assembly& a, int controller, double of_output, State
 template <class State>
 void rated_scale(const Assembly& a, State& s) {
     const Train& train = a.train();
-    for (std::size_t m = 0; m < train.motors.size(); ++m)
-        if (const int k = a.places().motors[m].torque; k != nowhere) s[k] = train.motors[m].law.rated_torque;
+    for (std::size_t m = 0; m < train.motors.size(); ++m) {
+        const MotorPlace& p = a.places().motors[m];
+        const Motor& law = train.motors[m].law;
+        if (p.torque != nowhere) s[p.torque] = law.rated_torque;
+        if (p.current != nowhere) s[p.current] = s[p.current + 1] = law.rated_current;
+    }
     for (std::size_t n = 0; n < train.shafts.size(); ++n) {
         const ShaftPlace& p = a.places().shafts[n];
         s[p.speed] = rated_speed(train, static_cast<int>(n));

@@ -8,11 +8,14 @@ namespace {
 void add_stepper(const ShaftMotor& m, int motor, ShaftElements& all) {
     const double n = m.law.pole_pairs(), error = m.law.error_of_torque();
     // The angle to the field is counted from half a period before it.
-    const AngleTorque field{m.name + "_current", m.shaft, PeriodicCurve::sine(m.law.holding_torque, n, 0.0, error)};
-    all.push_back(std::make_unique<AngleTorqueOnShaft>(field, motor, m.law.standstill_current));
+    if (!m.law.has_winding()) {
+        const AngleTorque field{m.name + "_current", m.shaft,
+                                PeriodicCurve::sine(m.law.holding_torque, n, 0.0, error, true)};
+        all.push_back(std::make_unique<AngleTorqueOnShaft>(field, motor, m.law.standstill_current));
+    }
     if (m.law.detent_torque > 0.0)
-        all.push_back(
-            on_shaft(AngleTorque{m.name, m.shaft, PeriodicCurve::sine(-m.law.detent_torque, 4.0 * n, 0.0, error)}));
+        all.push_back(on_shaft(
+            AngleTorque{m.name, m.shaft, PeriodicCurve::sine(-m.law.detent_torque, 4.0 * n, 0.0, error, true)}));
 }
 
 }  // namespace

@@ -18,13 +18,17 @@ struct Motor {
     double electrical_time_constant = 1e-3;  // tau_a [s]; 0: the torque follows voltage and speed at once
     double armature_voltage_constant = 2.0;  // k_N [-], stall torque / rated torque at rated voltage
     double voltage_limit = std::numeric_limits<double>::infinity();  // of |E_Z| [-]
-    // Of a stepper with ideal current. Its command is the angle of the field phi* [rad]: it turns its rotor with
-    // -T_H sin(n (phi - phi*)) - T_D sin(4 n phi), n = steps_per_revolution/4.
+    // Of a stepper. Its command is the angle of the field phi* [rad]. With ideal current it turns its rotor with
+    // -T_H sin(n (phi - phi*)) - T_D sin(4 n phi), n = steps_per_revolution/4; with a supply by `StepperWinding`.
     double steps_per_revolution = 200.0;
     double holding_torque = 1.0;      // T_H [N m]
     double detent_torque = 0.0;       // T_D [N m]
     double torque_error = 0.0;        // [N m], of the straight lines that stand for the sines; 0: T_H/1000
     double standstill_current = 1.0;  // share of the current that is left at rest
+    double rated_current = 1.0;       // I [A] of a phase
+    double resistance_phase = 1.0;    // R [ohm]
+    double inductance_phase = 1e-3;   // L [H]
+    double supply_voltage = 0.0;      // U [V]; 0: the current is ideal
 
     template <class Fields>
     void describe(Fields& f) {
@@ -60,8 +64,22 @@ struct Motor {
         f.number({"standstill_current", "", "", Range::share, Given::may_be_left_out,
                   "share of its current that a stepper keeps at rest; left out, all of it"},
                  standstill_current);
+        f.number({"rated_current", "", "A", Range::positive, Given::may_be_left_out,
+                  "current of a phase of a stepper, at which it has its holding torque with both phases on"},
+                 rated_current);
+        f.number({"resistance_phase", "", "ohm", Range::positive, Given::may_be_left_out,
+                  "resistance of a phase of a stepper"},
+                 resistance_phase);
+        f.number({"inductance_phase", "", "H", Range::positive, Given::may_be_left_out,
+                  "inductance of a phase of a stepper"},
+                 inductance_phase);
+        f.number({"supply_voltage", "", "V", Range::positive, Given::may_be_left_out,
+                  "supply of the driver of a stepper: its current follows resistance, inductance and induced voltage; "
+                  "left out, the current is ideal"},
+                 supply_voltage);
     }
 
+    bool has_winding() const { return kind == stepper && supply_voltage > 0.0; }
     double pole_pairs() const { return 0.25 * steps_per_revolution; }
     double error_of_torque() const { return torque_error > 0.0 ? torque_error : 1e-3 * holding_torque; }
 

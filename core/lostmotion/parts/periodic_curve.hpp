@@ -32,20 +32,24 @@ class PeriodicCurve {
         values_.push_back(values_.front());
     }
 
-    // amplitude * sin(n phi + phase), by chords that depart from it by at most `error` everywhere.
-    static PeriodicCurve sine(double amplitude, double n, double phase, double error) {
+    // amplitude * sin(n phi + phase), by chords that depart from it by at most `error` everywhere. of_mean: with the
+    // first harmonic of the sine, so that over many chords they take and give the same energy.
+    static PeriodicCurve sine(double amplitude, double n, double phase, double error, bool of_mean = false) {
         // Nodes on a circle of radius c: off by c - 1 there and by 1 - c cos(h/2) between, both tan^2(h/4) if
-        // c = 2/(1 + cos(h/2)).
+        // c = 2/(1 + cos(h/2)). The first harmonic is that of the sine if c = (h/2)^2/sin^2(h/2), and c - 1 the more.
         const double a = std::fabs(amplitude), share = std::min(error, a) / a;
-        const auto off = [](int quarter) {  // with so many nodes in a quarter of a turn
-            const auto [sin, cos] = sine_cosine(std::numbers::pi / 8.0 / quarter);
-            return (sin / cos) * (sin / cos);
+        const auto off = [of_mean](int quarter) {  // with so many nodes in a quarter of a turn
+            const double x = std::numbers::pi / (of_mean ? 4.0 : 8.0) / quarter;
+            const auto [sin, cos] = sine_cosine(x);
+            return of_mean ? (x / sin) * (x / sin) - 1.0 : (sin / cos) * (sin / cos);
         };
-        int quarter = std::max(1, static_cast<int>(std::numbers::pi / 8.0 / std::sqrt(share)));  // tan x > x
+        // tan x > x, and x^2/sin^2 x > 1 + x^2/3.
+        const double few = std::numbers::pi / (of_mean ? 4.0 * std::sqrt(3.0) : 8.0) / std::sqrt(share);
+        int quarter = std::max(1, static_cast<int>(few));
         while (off(quarter) > share) ++quarter;
         const int pieces = 4 * quarter;
         const double width = 2.0 * std::numbers::pi / pieces;
-        const double outwards = 2.0 / (1.0 + sine_cosine(0.5 * width).cos);
+        const double outwards = of_mean ? 1.0 + off(quarter) : 2.0 / (1.0 + sine_cosine(0.5 * width).cos);
         // No corner at angle 0, where most runs begin: a slope that jumps there would have no value.
         const auto node = [&](double k) { return amplitude * outwards * sine_cosine(width * k + phase).sin; };
         std::vector<double> angles{0.0}, values{0.5 * (node(-0.5) + node(0.5))};

@@ -50,9 +50,9 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
         if (k >= first_reference(a)) break;
         if (is_given(p, static_cast<int>(k))) continue;  // the speed is a state
         const auto loaded = std::ranges::find(p.shafts, static_cast<int>(k), &model::ShaftPlace::load);
-        const auto stepper =
-            std::ranges::find_if(p.acting, [&](const auto& e) { return e->position == static_cast<int>(k); });
-        if (stepper != p.acting.end()) {
+        const auto motor = std::ranges::find(p.motors, static_cast<int>(k), &model::MotorPlace::command);
+        if (motor != p.motors.end() &&
+            t.motors[static_cast<std::size_t>(motor - p.motors.begin())].law.kind == Motor::stepper) {
             out.push_back({C::input, static_cast<int>(k), inputs[k], "rad", "angle of the field", "phi*"});
         } else if (loaded == p.shafts.end()) {
             out.push_back({C::input, static_cast<int>(k), inputs[k], "1", "command: 1 is the rated value", "E_C"});
@@ -67,6 +67,14 @@ std::vector<TrainChannel> train_channels(const model::Assembly& a) {
         out.push_back({C::motor_torque, static_cast<int>(k), model::motor_torque_of(t, k),
                        model::torque_unit(t, t.motors[k].shaft),
                        std::string(model::torque_word(t, t.motors[k].shaft)) + " of the motor", "M_D"});
+    for (std::size_t k = 0; k < t.motors.size(); ++k)
+        if (t.motors[k].law.kind == Motor::stepper)
+            out.push_back({C::field_lead, static_cast<int>(k), t.motors[k].name + "_electrical_angle", "rad",
+                           "electrical angle of the field before the rotor; from pi on the rotor slips", "delta"});
+    for (std::size_t k = 0; k < t.motors.size(); ++k)
+        for (int phase = 0; p.motors[k].current != model::nowhere && phase < 2; ++phase)
+            out.push_back({C::state, p.motors[k].current + phase, model::phase_current_of(t, k, phase), "A",
+                           "current of a phase", phase == 0 ? "i_a" : "i_b"});
     for (std::size_t k = 0; k < p.driven.size(); ++k) {
         const model::ShaftPlace& shaft = p.shafts[static_cast<std::size_t>(p.driven[k])];
         const std::string& name = t.shafts[static_cast<std::size_t>(p.driven[k])].name;

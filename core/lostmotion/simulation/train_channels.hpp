@@ -25,7 +25,8 @@ struct TrainChannel {
         twist_sign,
         output,
         error,
-        pressing_torque
+        pressing_torque,
+        field_lead
     } kind;
     // The number of the input, state, motor, gear, contact, given motion, shaft, controller or element; of a shaft
     // without inertia, that among these.

@@ -3,6 +3,12 @@
 namespace lostmotion {
 
 std::string check_start(const model::Assembly& a, std::span<const double> start) {
+    for (std::size_t m = 0; m < a.places().motors.size(); ++m)
+        if (const model::MotorPlace& p = a.places().motors[m];
+            p.current != model::nowhere && p.winding == model::nowhere)
+            return "the current of '" + a.train().motors[m].name +
+                   "' depends on products of speed and angle, which only runs of the adaptive solver have; leave "
+                   "supply_voltage out for an ideal current";
     std::vector<double> speeds;
     for (const model::ShaftPlace& s : a.places().shafts)
         speeds.push_back(start.empty() ? 0.0 : start[static_cast<std::size_t>(s.speed)]);

@@ -54,8 +54,13 @@ def run(
         ),
     ] = None,
     solver: Annotated[
-        str, typer.Option("--solver", metavar="NAME", help="exact, or dormand-prince as a second opinion.")
-    ] = "exact",
+        str | None,
+        typer.Option(
+            "--solver",
+            metavar="NAME",
+            help="exact, or dormand-prince as a second opinion, which a stepper with a winding needs.",
+        ),
+    ] = None,
     tolerance: Annotated[
         float | None,
         typer.Option(
@@ -125,15 +130,17 @@ def run(
     conclude(verdict)
 
 
-def _simulated(loaded: Scenario, solver: str, tolerance: float | None) -> RunArrays:
+def _simulated(loaded: Scenario, solver: str | None, tolerance: float | None) -> RunArrays:
     """The run; where it leaves the range of numbers, an error that names the loop that is unstable."""
     from .._core import SolverError
     from ..errors import InputError
     from ..simulation.runs.run import TOLERANCE
     from ..simulation.runs.run import run as work
+    from ..simulation.scenario.requirements import wound
 
     try:
-        with simulating("Simulating", loaded, 0.0 if solver == "exact" else tolerance or TOLERANCE):
+        adaptive = solver == "dormand-prince" or (solver is None and any(wound(loaded)))
+        with simulating("Simulating", loaded, (tolerance or TOLERANCE) if adaptive else 0.0):
             return work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     except SolverError as error:
         from ..reports.run_loops import unstable_loops
@@ -187,11 +194,11 @@ def _check_figure(figure: str | None, plot: Path | None) -> None:
             raise InputError(f"--figure {figure}: is not known; take one of {', '.join(FIGURES)}")
 
 
-def _check_solver(solver: str, tolerance: float | None) -> None:
+def _check_solver(solver: str | None, tolerance: float | None) -> None:
     from ..errors import InputError
     from ..simulation.runs.run import TOLERANCES
 
-    if solver not in ("exact", "dormand-prince"):
+    if solver not in (None, "exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")
     if tolerance is not None and solver == "exact":
         raise InputError(

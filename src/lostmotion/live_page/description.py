@@ -17,7 +17,7 @@ from ..simulation.scenario.units_of_keys import limit_in, unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
-from .drawn import axis_figures, drawn
+from .drawn import axis_figures, drawn, stepper_figures
 from .loops import loop_views
 from .references import reference_sliders, reference_view
 
@@ -56,11 +56,17 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
         "open_loop": not (scenario.axes() or scenario.continuous()),
         "loops": [view for motor in scenario.axes() for view in loop_views(scenario, motor)],
         "figures": [
-            figure
-            for motor, c in scenario.axes().items()
-            for figure in axis_figures(
-                c, motor, bool(scenario.prefix(motor)), scenario.sliding().get(scenario.prefix(motor), (False, False))
-            )
+            *stepper_figures(scenario),
+            *(
+                figure
+                for motor, c in scenario.axes().items()
+                for figure in axis_figures(
+                    c,
+                    motor,
+                    bool(scenario.prefix(motor)),
+                    scenario.sliding().get(scenario.prefix(motor), (False, False)),
+                )
+            ),
         ],
         "sliders": [s.to_page() for s in _sliders(scenario, values, closed)],
         "scenario": scenario.model_dump(exclude_none=True, mode="json"),

@@ -43,7 +43,12 @@ def drawn(scenario: Scenario) -> dict[str, Any]:
         for n, g in train.gears.items()
     ]
     motors = [
-        {"name": n, "shaft": m.shaft, "torque": train.motor_torque_of(n), "command": known(train.command_of(n))}
+        {
+            "name": n,
+            "shaft": m.shaft,
+            "torque": train.motor_torque_of(n),
+            "command": None if m.kind == "stepper" else known(train.command_of(n)),
+        }
         for n, m in train.motors.items()
     ]
     twists = {f"{train.twist_of(n)}_contact": n for n in train.gears}
@@ -62,6 +67,19 @@ def drawn(scenario: Scenario) -> dict[str, Any]:
             if c.endswith("_contact") and c not in rigid
         ],
     }
+
+
+def stepper_figures(scenario: Scenario) -> list[dict[str, Any]]:
+    """Charts over time of the fields of steppers."""
+    train = scenario.train()
+    steppers = [name for name, motor in train.motors.items() if motor.kind == "stepper"]
+    series = {
+        "Field": [{"variable": train.command_of(n), "label": n} for n in steppers],
+        "Field before the rotor, electrical angle": [
+            {"variable": f"{n}_electrical_angle", "label": n} for n in steppers
+        ],
+    }
+    return [{"title": title, "unit": "rad", "series": lines} for title, lines in series.items() if lines]
 
 
 def axis_figures(

@@ -13,7 +13,6 @@ from ..inputs.described import MotorFields, ShaftMotorFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Current,
-    Inductance,
     Number,
     Positive,
     Resistance,
@@ -110,7 +109,7 @@ STEPPER_KEYS = (
     "supply_voltage",
 )
 # Share of the holding torque, for 16 straight lines in a quarter of a period: microsteps up to 1/16 do not end at a corner.
-USUAL_TORQUE_ERROR = 6.03e-4
+USUAL_TORQUE_ERROR = 8.04e-4
 LEAST_TORQUE_ERROR = 2e-8  # share of the holding torque; less takes more straight lines than the core has room for
 # Keys of a DC motor known by its line from stall to no load, in place of its rated point.
 LINE_KEYS = ("stall_torque", "no_load_speed")
@@ -150,14 +149,6 @@ class Motor(MotorFields):
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
     voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase; `stepper`: hybrid stepper, whose command is the angle
     of its field"""
-    rated_current: Annotated[Current, Positive] | None = None
-    """current of a phase of a stepper, amplitude, at which it has its holding torque"""
-    resistance_phase: Annotated[Resistance, Positive] | None = None
-    """resistance of a phase of a stepper"""
-    inductance_phase: Annotated[Inductance, Positive] | None = None
-    """inductance of a phase of a stepper"""
-    supply_voltage: Annotated[Voltage, Positive] | None = None
-    """supply of the driver of a stepper, for the pull-out torque over the speed"""
     winding: Winding | None = None
     """winding of a synchronous motor, or of one that is modelled as a torque source, for its current and its heat"""
     limits: MotorLimits | None = None
@@ -211,6 +202,12 @@ class Motor(MotorFields):
             raise ValueError(
                 f"has steps_per_revolution = {self.steps_per_revolution:g}, which must be a multiple of 4: two phases make four steps in a period of the field"
             )
+        if self.supply_voltage is not None:
+            for key in ("rated_current", "resistance_phase", "inductance_phase"):
+                if getattr(self, key) is None:
+                    raise ValueError(
+                        f"lacks {key}, which its supply_voltage needs; leave supply_voltage out for an ideal current"
+                    )
         if self.torque_error is not None and self.torque_error < LEAST_TORQUE_ERROR * self.holding_torque:
             raise ValueError(
                 f"has torque_error = {self.torque_error:g} N*m, less than {LEAST_TORQUE_ERROR:g} of its holding_torque; allow more"

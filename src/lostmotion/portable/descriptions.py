@@ -9,6 +9,7 @@ from ..control.axis import OPEN_LOOP
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..simulation.runs.core_runs import core_case
+from ..simulation.scenario.requirements import need_ideal_current
 from ..simulation.scenario.scenario import Scenario
 from .derivation import Derivation, derivation_of
 
@@ -71,6 +72,7 @@ def numbers_of(scenario: Scenario, case: _core.Case | None = None) -> np.ndarray
             f"controller of {own[0]}: has a law of your own, which only Python can call; describe the scenario without it, and turn "
             "the motor by its command"
         )
+    need_ideal_current(scenario, "description")
     table = scenario.tables.simulation
     times = {"duration": table.duration, "sample_interval": table.sample_interval}
     control = scenario.control() if scenario.axes() else OPEN_LOOP

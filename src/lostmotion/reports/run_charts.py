@@ -110,6 +110,11 @@ def _elements(result: xarray.Dataset) -> Iterator[Chart]:
     wanted: list[tuple[str, str, list[Series]]] = [
         ("Command", "command [-]", [(train.command_of(n), n, 1.0) for n in scenario.commanded() if n not in steppers]),
         ("Fields of steppers", "angle [rad]", [(train.command_of(n), n, 1.0) for n in steppers]),
+        (
+            "Field before the rotor",
+            "electrical angle [deg]",
+            [(f"{n}_electrical_angle", n, math.degrees(1.0)) for n in steppers],
+        ),
         *_by_domain(train, "{Torque} of motors", "{torque} [{unit}]", "torque", motors),
         *(_speeds(part.train()) for part in parts_of(scenario)),
         *_by_domain(train, "{Torque} at outputs and loads", "{torque} [{unit}]", "torque", outputs + loads),

@@ -13,6 +13,7 @@ from ..errors import InputError
 from ..model.gear import Gear
 from ..model.linear_train import LinearElements
 from ..model.train import DriveTrain
+from ..recorded_numbers import may_be_left_out
 from .variables import Variable, variables_of_core
 
 ALL_SIGNALS = tuple(name for name, _, _ in _core.axis_signals())
@@ -90,6 +91,9 @@ def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     Numbers or arrays; of an error backward numbers alone, as the solver has that angle in runs.
     """
     error = gear.transmission_error
+    if error is not None and may_be_left_out(getattr(error, "phase", 1.0)):
+        # One of 0 leaves no trace in the angle.
+        raise ValueError("the angle behind a transmission error is no formula of its phase")
     if forward:
         return angle / gear.ratio - twist - (0.0 if error is None else np.vectorize(error.core())(angle))
     found = wanted = gear.ratio * (angle + twist)

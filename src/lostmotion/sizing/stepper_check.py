@@ -81,7 +81,7 @@ def torque_reserve(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: s
         return Finding("stepper_torque", what, value, "unknown", remark)
     verdict: Judgement = "ok" if share <= 1.0 / SAFETY else "caution" if share <= 1.0 else "warning"
     remark = (
-        "the rotor falls out of step"
+        "beyond what the winding gives at that speed: the rotor falls out of step"
         if verdict == "warning"
         else f"safety {1.0 / share:.3g}, wanted {SAFETY:g}"
         if share > 0.0

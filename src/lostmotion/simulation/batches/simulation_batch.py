@@ -19,6 +19,7 @@ from ...model.drive import Drive
 from ...model.train import DriveTrain
 from ..forms.given_motion import check_motion
 from ..runs.sensitivities import value_at
+from ..scenario.requirements import need_ideal_current
 from ..scenario.scenario import Scenario
 from ..stepping.load_answers import LoadAnswer
 from ..stepping.step_inputs import MAX_INTERVAL, MIN_INTERVAL, no_input
@@ -374,6 +375,7 @@ class SimulationBatch:
 def _stepped(drive: Drive | Scenario | DriveTrain) -> Scenario:
     """Scenario of what is stepped. On a train alone a load torque may act on all shafts."""
     scenario = Scenario.of_any(drive)
+    need_ideal_current(scenario, "batch")
     if isinstance(drive, DriveTrain):
         loads: dict[str, Any] = {
             f"shafts.{name}.torque": {} for name in scenario.tables.shafts if name not in scenario.loaded()

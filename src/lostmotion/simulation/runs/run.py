@@ -21,6 +21,7 @@ from ..forms.drive_tables import Initial
 from ..forms.train_tables import TrainInitial
 from ..scenario.field_oriented_motors import ATTRIBUTE as ERROR_BOUND
 from ..scenario.field_oriented_motors import coarser, error_bound, oriented, too_slow
+from ..scenario.requirements import need_ideal_current, wound
 from ..scenario.scenario import Scenario
 from .core_runs import Options, core_result
 from .energy_ledger import warned
@@ -35,6 +36,7 @@ SolverName = Literal["exact", "dormand-prince"]
 OutputName = Literal["dataset", "arrays"]
 
 TOLERANCE = 1e-8  # of the adaptive solver, if none is given
+TOLERANCE_OF_WINDINGS = 1e-10  # the same where its steps are short anyway, and no other solver is at hand
 TOLERANCES = (1e-15, 1e-3)  # beyond rounding, and beyond what finds the switching instants
 
 MAX_SWITCHINGS = 100_000  # kept with a result; beyond it they are only counted
@@ -50,7 +52,7 @@ def simulate(
     duration: float | None = None,
     sample_interval: float | None = None,
     initial: Initial | TrainInitial | None = None,
-    solver: SolverName = "exact",
+    solver: SolverName | None = None,
     relative_tolerance: Number | None = None,
     energy: bool | None = None,
     law: Any = None,
@@ -66,7 +68,7 @@ def simulate(
     duration: float | None = None,
     sample_interval: float | None = None,
     initial: Initial | TrainInitial | None = None,
-    solver: SolverName = "exact",
+    solver: SolverName | None = None,
     relative_tolerance: Number | None = None,
     energy: bool | None = None,
     law: Any = None,
@@ -81,7 +83,7 @@ def simulate(
     duration: float | None = None,
     sample_interval: float | None = None,
     initial: Initial | TrainInitial | None = None,
-    solver: SolverName = "exact",
+    solver: SolverName | None = None,
     relative_tolerance: Number | None = None,
     energy: bool | None = None,
     law: Any = None,
@@ -104,9 +106,10 @@ def simulate(
     initial : Initial or TrainInitial, optional
         State at t = 0. Default: rest.
     solver : str
-        ``"exact"``, or ``"dormand-prince"`` for the adaptive solver, which computes no energy ledger.
+        ``"exact"``, or ``"dormand-prince"`` for the adaptive solver, which computes no energy ledger. Default: the exact solver, or the
+        adaptive one where a stepper has a winding.
     relative_tolerance : float, optional
-        Tolerance of the adaptive solver, 1e-15 to 1e-3. Default: 1e-8. The exact solver has none.
+        Tolerance of the adaptive solver, 1e-15 to 1e-3. Default: 1e-8, with a winding 1e-10. The exact solver has none.
     energy : bool, optional
         Whether to compute the energy ledger with the motion, which takes about as long again. By default `energy_of`, `save` and
         reports compute it by a second run when they need it; with a law it is computed at once.
@@ -156,8 +159,9 @@ def simulate(
     result = arrays.dataset()
     if sensitivities is None:
         return result
-    if solver != "exact" or law is not None:
-        other = f"solver={solver!r}" if solver != "exact" else "law"
+    need_ideal_current(scenario, "sensitivities")
+    if solver == "dormand-prince" or law is not None:
+        other = f"solver={solver!r}" if solver == "dormand-prince" else "law"
         raise InputError(
             f"sensitivities, {other}: derivatives are those of the exact solver, under controllers of the scenario"
         )
@@ -167,20 +171,23 @@ def simulate(
 def run(
     scenario: Scenario,
     *,
-    solver: SolverName = "exact",
+    solver: SolverName | None = None,
     relative_tolerance: float | None = None,
     energy: bool = True,
     law: Any = None,
 ) -> RunArrays:
     """Run a scenario as `simulate` does, with the result as plain arrays."""
-    if solver not in ("exact", "dormand-prince"):
+    if solver not in (None, "exact", "dormand-prince"):
         raise InputError(f'solver {solver!r} is not known; it must be "exact" or "dormand-prince"')
-    exact = solver == "exact"
+    exact = not any(wound(scenario)) if solver is None else solver == "exact"
+    if exact:
+        need_ideal_current(scenario, "exact solver")
     if exact and relative_tolerance is not None:
         raise InputError(
             f'relative_tolerance {relative_tolerance:g}: the exact solver has none; leave it out, or give solver="dormand-prince"'
         )
-    tolerance = TOLERANCE if relative_tolerance is None else relative_tolerance
+    usual = TOLERANCE_OF_WINDINGS if any(wound(scenario)) else TOLERANCE
+    tolerance = usual if relative_tolerance is None else relative_tolerance
     low, high = TOLERANCES
     if not low <= tolerance <= high:
         raise InputError(f"relative_tolerance {tolerance:g} must lie between {low:g} and {high:g}")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+
 from ...errors import InputError
 from ...model.torsion import Rigid
 from ...model.train import DriveTrain
@@ -43,9 +45,25 @@ def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
             raise InputError(f"{function}: {key} are rigid, and this takes no impacts; give them a stiffness")
 
 
+def wound(scenario: Scenario) -> Iterator[str]:
+    """Names of the steppers whose current follows their winding."""
+    motors = scenario.tables.motors.items()
+    return (name for name, m in motors if m.kind == "stepper" and m.supply_voltage is not None)
+
+
+def need_ideal_current(scenario: Scenario, function: str) -> None:
+    """Refuses steppers with a winding, whose torque is a product of states: no regime of the exact solver is linear then."""
+    for name in wound(scenario):
+        raise InputError(
+            f"{function}: the torque of a winding is a product of current and angle, which only runs of the adaptive solver have; leave it out for an ideal current",
+            f"{scenario.key_in_file(scenario.motor_key(name))}.supply_voltage",
+        )
+
+
 def need_free_motion(scenario: Scenario, function: str) -> None:
     """Refuses a train in which the motion of a shaft is given or flanks strike, for what torques alone are to move."""
     need_no_impacts(scenario, function)
+    need_ideal_current(scenario, function)
     if given := scenario.given():
         raise InputError(
             f"{function}: key {scenario.given_key(given[0])} gives the motion of a shaft, which torques are to move here; leave it out"

@@ -26,6 +26,7 @@ from ..forms.drive_tables import Initial
 from ..forms.given_motion import SLIDE_UNITS, UNITS, motion_given
 from ..forms.train_tables import TrainInitial
 from ..scenario.field_oriented_motors import bounded, coarser
+from ..scenario.requirements import need_ideal_current
 from ..scenario.scenario import Scenario
 from ..variables import Variable, variables_of_core
 from ..variables_of_trains import only_input
@@ -112,6 +113,7 @@ class Simulation(SimulationAnswers):
         if not MIN_INTERVAL <= step <= MAX_INTERVAL:
             raise InputError(f"step {step} s must lie between {MIN_INTERVAL:g} s and {MAX_INTERVAL:g} s")
         scenario, core, self._loaded, self._given = parts(drive, loaded, given)
+        need_ideal_current(scenario, "simulation step by step")
         self._drive = drive.alone() if isinstance(drive, Scenario) else drive
         self._scenario, self._train, self._core_train = scenario, scenario.train(), core
         self._initial = scenario.begin()
