@@ -134,7 +134,7 @@ TEST_SUITE("contacts") {
 
     TEST_CASE("no contact, damper or hysteresis ever gives energy") {
         RandomDrives random(7);
-        for (int n = 0; n < 150; ++n) {
+        for (int n = 0; n < cases(750); ++n) {
             const Drive drive = random.drive();
             if (drive.jams()) continue;
             const Samples s = run(drive, random.signals(drive, 0.4), 0.4, 0.01);
@@ -228,7 +228,7 @@ TEST_SUITE("contacts") {
 
     TEST_CASE("mirror the inputs and the motion mirrors") {
         RandomDrives random(11);
-        for (int n = 0; n < 60; ++n) {
+        for (int n = 0; n < cases(300); ++n) {
             Drive drive = random.drive();
             if (drive.jams()) continue;
             Signals signals = random.signals(drive, 0.3), mirrored = signals;

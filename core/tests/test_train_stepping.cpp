@@ -163,7 +163,7 @@ TEST_CASE("random trains stepped with intervals split at random follow the run i
 
 TEST_CASE("a restored simulation of a train continues bit for bit") {
     RandomTrains random(53);
-    for (int n = 0; n < 60; ++n) {
+    for (int n = 0; n < cases(300); ++n) {
         const Train train = random.train(random.pick(2, 6), true);
         TrainSimulation a(train, 1e-2), b(train, 1e-2);
         const auto levels = random_levels(random, 121, a.assembly().layout().inputs);
