@@ -1,7 +1,8 @@
 """How a test looks at an error: one line, in plain words."""
 
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import pytest
@@ -31,3 +32,11 @@ def assert_file_refused(path: Path, text: str, old: str, new: str, words: list[s
     for word in (str(path), *words):
         assert word in message, message
     assert_plain(message)
+
+
+@contextmanager
+def refuses(*keys: str) -> Iterator[None]:
+    """What is within is refused, with these keys as data of the error."""
+    with pytest.raises(lm.InputError) as caught:
+        yield
+    assert [problem.keys for problem in caught.value.problems if problem.keys] == [keys], str(caught.value)

@@ -17,7 +17,7 @@ from conftest import ROOT, lostmotion
 from lostmotion.inputs.validation import listed, nearest
 from lostmotion.simulation.scenario.scenario import Scenario
 from lostmotion.studies.expressions.expressions import Expression
-from refusals import assert_file_refused, assert_plain, refused
+from refusals import assert_file_refused, assert_plain, refused, refuses
 
 GOOD = """
 [command]
@@ -189,10 +189,10 @@ def test_an_override_that_cannot_be_is_refused_as_it_was_written(tmp_path: Path,
 
 def test_all_missing_keys_are_named_at_once(tmp_path: Path) -> None:
     (tmp_path / "empty.toml").write_text("")
-    with pytest.raises(lm.InputError, match="keys motor, gearbox, load, simulation: are missing"):
+    with refuses("motor", "gearbox", "load", "simulation"):
         lm.load(tmp_path / "empty.toml")
     (tmp_path / "some.toml").write_text(GOOD.replace("ratio = 90\n", "").replace("duration = 0.01\n", ""))
-    with pytest.raises(lm.InputError, match=r"keys gearbox\.ratio, simulation\.duration: are missing"):
+    with refuses("gearbox.ratio", "simulation.duration"):
         lm.load(tmp_path / "some.toml")
 
 
@@ -643,7 +643,7 @@ def test_an_error_carries_keys_and_reasons_as_data(tmp_path: Path) -> None:
         'base = "paper-2dof-nl-small"\n[controller]\nkind = "continuous"\nlimit = 1.0\nshaft = "lod"\n'
         'reference = { kind = "position", mean = 0.1 }\nposition = { gain = 2.0 }\n'
     )
-    with pytest.raises(lm.InputError, match=r'key controller\.shaft: "lod" is no shaft; did you mean load\?'):
+    with refuses("controller.shaft"):
         lm.load(path)
 
 

@@ -10,6 +10,7 @@ import pytest
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, SCENARIOS
 from lostmotion.simulation.forms.drive_tables import DriveTables, drive_schema
+from refusals import refuses
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
@@ -22,7 +23,7 @@ def test_scenarios_load_and_survive_json(path: Path) -> None:
 
 def test_wrong_json_of_a_train_is_refused_by_its_own_key() -> None:
     text = '{"shafts": {"rotor": {"inertia": -1}}, "simulation": {"duration": 1, "sample_interval": 0.1}}'
-    with pytest.raises(lm.InputError, match=r"key shafts\.rotor\.inertia: -1"):
+    with refuses("shafts.rotor.inertia"):
         lm.Scenario.from_json(text)
 
 

@@ -34,6 +34,7 @@ from lostmotion.studies.runs.runs_in_core import core_can
 from lostmotion.studies.study.random_designs import CHUNK
 from lostmotion.studies.study.study import Study
 from lostmotion.studies.study.vary import Vary
+from refusals import refuses
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 
@@ -738,7 +739,7 @@ def test_a_saved_result_can_be_the_base_of_a_study(tmp_path: Path):
 def test_a_saved_result_is_refused_where_a_file_of_text_is_wanted(tmp_path: Path):
     lm.save(lm.simulate(lm.load("step-to-standstill")), tmp_path / "result.csv")
     (tmp_path / "s.toml").write_text('base = "result.csv"\n')
-    with pytest.raises(InputError, match=r'key base: "result.csv" has the ending of a saved result; name a scenario file'):
+    with refuses("base"):
         lm.load(tmp_path / "s.toml")
     with pytest.raises(InputError, match=r"result.csv: has the ending of a saved result; a study is a TOML file"):
         lm.studies.load_study(tmp_path / "result.csv")
