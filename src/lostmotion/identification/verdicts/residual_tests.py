@@ -201,7 +201,7 @@ def explained(problem: Problem, residuals: Sequence[np.ndarray]) -> bool:
 
 
 def hidden(problem: Problem, residuals: Sequence[np.ndarray], found: Sequence[Misfit], correlation: float) -> float:
-    """BoundController of the weighted squares by which runs of the right values may differ from those found; 0 where noise explains the residuals.
+    """Bound of the weighted squares by which runs of the right values may differ from those found; 0 where noise explains the residuals.
 
     A change d of what the channels show moves the values by (J'WJ)^-1 J'W d, each by at most sqrt(((J'WJ)^-1)_kk d'Wd) (Cauchy and
     Schwarz). A model that lacks something leaves residuals r at the right values too, so d may be 2 r.

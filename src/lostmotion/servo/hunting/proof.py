@@ -69,7 +69,7 @@ def _shares(contact: StickSlip, largest: float) -> Proof:
 
 
 def _share(contact: StickSlip, error: float) -> tuple[float, str]:
-    """BoundController of the share of its error that a slip leaves, for all errors up to one, and why there is none.
+    """Bound of the share of its error that a slip leaves, for all errors up to one, and why there is none.
 
     With transients in proportion, a smaller error has the same map, and no shorter stuck interval: what holds for the largest
     error holds for all.
@@ -148,7 +148,7 @@ def _orbit(contact: StickSlip) -> tuple[list[float], str]:
 
 
 def _kept(contact: StickSlip, low: float, high: float) -> tuple[Transients | tuple[float, float] | None, str]:
-    """BoundController of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
+    """Bound of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
     left = Transients.none(contact)
     for _ in range(ROUNDS):
         images = _images(contact, low, high, left)

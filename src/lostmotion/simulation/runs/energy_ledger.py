@@ -23,7 +23,7 @@ def ledger_of(scenario: Scenario) -> dict[str, float]:
 
 
 def largest_stored(data: Mapping[Any, Any]) -> float:
-    """BoundController on the elastic energy of each gear in a run [J]: output torque times twist."""
+    """Bound on the elastic energy of each gear in a run [J]: output torque times twist."""
     largest = 0.0
     for torque, twist in (("output_torque", "twist"), ("output_force", "deflection")):
         for gear in (str(name).removesuffix(torque) for name in data if str(name).endswith(torque)):
