@@ -212,11 +212,11 @@ def test_two_axes_in_one_scenario_are_those_of_two() -> None:
     [(1.0, "fits", "all the time"), (0.97, "does not fit", "for 3 % of"), (1.0 - 2e-5, "does not fit", "for 0.002 % of")],
 )
 def test_a_target_that_leaves_the_view_does_not_fit(share: float, state: str, said: str) -> None:
-    found = verdict_of(SimpleNamespace(view=View(share, 0.5)))  # type: ignore[arg-type]
+    found = verdict_of(SimpleNamespace(lost=(), view=View(share, 0.5)))  # type: ignore[arg-type]
     assert found is not None
     assert found.state == state
     assert said in found.lines[0]
-    assert verdict_of(SimpleNamespace(view=None)) is None  # type: ignore[arg-type]
+    assert verdict_of(SimpleNamespace(lost=(), view=None)) is None  # type: ignore[arg-type]
 
 
 def test_the_command_writes_its_sheet(tmp_path: Path) -> None:

@@ -110,7 +110,7 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
     from rich.table import Table
     from rich.text import Text
 
-    from ..reports.pointing import budget_rows, header, verdict_of, view_line
+    from ..reports.pointing import budget_rows, header, order_header, order_rows, verdict_of, view_line
 
     print(title)
     table = Table(box=None, pad_edge=False)
@@ -122,6 +122,13 @@ def _print_summary(title: str, budget: PointingBudget) -> None:
             table.add_row(*map(Text, row))
     console(sys.stdout, 160).print(table)
     print(f"  {budget.after_line}")
+    if by_order := order_rows(budget):
+        orders = Table(box=None, pad_edge=False)
+        for name in order_header(budget):
+            orders.add_column(Text(name))
+        for row in by_order[:ROWS]:
+            orders.add_row(*map(Text, row))
+        console(sys.stdout, 160).print(orders)
     if budget.view is not None:
         print(f"  {view_line(budget)}")
     if (verdict := verdict_of(budget)) is not None:

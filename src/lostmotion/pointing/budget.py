@@ -11,11 +11,15 @@ from typing import Any
 
 import numpy as np
 
+from ..control.turning import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.validation import did_you_mean, shown
-from ..simulation.runs.pointing_error import pointing_errors, pointing_names
+from ..response.spectrum import Spectrum, spectrum
+from ..simulation.runs.lost_steps import LostSteps, found_in
+from ..simulation.runs.pointing_error import pointed, pointing_errors, pointing_names
+from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario
@@ -39,7 +43,7 @@ class PointingError:
     """0.6745 standard deviations"""
     measured_rms: float
     """rms of the measured direction: with a camera, target minus expected target of its tracker; else the angle of the load minus that of the
-    encoder"""
+    encoder, or of a stepper minus the one that its driver counts"""
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,10 @@ class PointingBudget:
     """angle of a pixel [rad] of the axes with a camera"""
     units: Mapping[str, str]
     """unit of each axis: rad, or m of a slide"""
+    lost: tuple[LostSteps, ...]
+    """steps that the steppers lose"""
+    orders: Mapping[str, Spectrum | str]
+    """error of each stepper's axis at constant speed by orders, or why there is none"""
     view: View | None = None
     """view, if a field of view is given or cameras have one"""
     limits: Mapping[str, float] = field(default_factory=dict)
@@ -120,12 +128,13 @@ def pointing_budget(
     alone, and with one cause after another removed. Further motions have other controllers, temperatures, wear and
     target speeds. Causes are backlash, the zone of low stiffness, hysteresis, dry friction, gear losses, encoder
     steps, delay, wind, and latency, noise and pixels of cameras. A controller with an inverse model knows the drive
-    of each run, except its temperature.
+    of each run, except its temperature. An axis of a stepper has no loop. Its causes are also microsteps, the sine table of its driver,
+    detents and transmission errors, and `orders` has its error at constant speed.
 
     Parameters
     ----------
     scenario : Scenario
-        One axis or several (`[controllers.MOTOR]`), each with a reference of the position.
+        One axis or several (`[controllers.MOTOR]`, or steppers with `stepping`), each with a reference of the position.
     after : float or str, optional
         Time [s] from which errors count. Default: the end of the start-up transient. To find it, the same run is made from another
         start: on the reference or, if the scenario begins on it, at rest there. Errors count after twice the time in which both
@@ -161,7 +170,8 @@ def pointing_budget(
     loaded = scenario.long()
     given = None if after is None else argument("after", after, "s")
     _check(loaded, given or 0.0)
-    as_it_is = _run(loaded)
+    result = run(loaded, energy=False)
+    as_it_is = _errors(loaded, result)
     start, line = (
         _end_of_transient(loaded, as_it_is)
         if given is None
@@ -208,13 +218,29 @@ def pointing_budget(
         dict(sorted((speeds | {1.0: whole}).items())) if speeds else {},
         {m: c.camera.pixel for m, c in loaded.axes().items() if c.camera is not None and c.camera.pixel is not None},
         units_of_axes(loaded),
+        found_in(loaded, result),
+        {motor: _by_order(loaded, motor) for motor in steppers(loaded)},
         _in_view(time >= start, errors, angles) if angles else None,
         limits,
     )
 
 
+def steppers(scenario: Scenario) -> list[str]:
+    """Motors of the axes without a loop."""
+    return [motor for motor in pointed(scenario) if motor not in scenario.axes()]
+
+
+def _by_order(scenario: Scenario, motor: str) -> Spectrum | str:
+    try:
+        return spectrum(scenario, motor=motor)
+    except InputError as error:
+        return error.problems[0].sentence()
+
+
 def _end_of_transient(scenario: Scenario, as_it_is: OneRun) -> tuple[float, str]:
     """From when on errors do not depend on how the axes start [s], and the line that says so."""
+    if not scenario.axes():
+        return 0.0, "errors count from the start, at which each stepper is aligned (--after leaves a beginning out)"
     time, first, _ = as_it_is
     second = _run(without(scenario, [_other_start(scenario)]) or scenario)[1]
     half = len(time) // 2
@@ -279,9 +305,9 @@ def runs_of(scenario: Scenario) -> int:
 
 
 def _check(scenario: Scenario, after: float) -> None:
-    if not scenario.axes():
+    if not scenario.axes() and not pointed(scenario):
         raise InputError(
-            "the scenario has no sampled controller; add [controller], or [controllers.MOTOR] for each axis"
+            "the scenario has no sampled controller; add [controller], or [controllers.MOTOR] for each axis; of a stepper command.stepping"
         )
     for motor, controller in scenario.axes().items():
         if controller.reference.kind != "position":
@@ -298,9 +324,9 @@ def _check(scenario: Scenario, after: float) -> None:
 def _angles(scenario: Scenario, name: str, given: Mapping[str, float | str]) -> dict[str, float]:
     """Angles or lengths above 0 of axes, which the argument of this name gives."""
     for motor in given:
-        if motor not in scenario.axes():
-            names = ", ".join(scenario.axes())
-            meant = did_you_mean(motor, scenario.axes(), f"the motors with a controller are {names}")
+        if motor not in pointed(scenario):
+            names = ", ".join(pointed(scenario))
+            meant = did_you_mean(motor, pointed(scenario), f"the motors with a controller are {names}")
             raise InputError(f"{name}: {shown(motor)} is the motor of no axis; {meant}")
     units = units_of_axes(scenario)
     angles = {motor: argument(f"{name}[{motor}]", angle, units[motor]) for motor, angle in given.items()}
@@ -311,8 +337,8 @@ def _angles(scenario: Scenario, name: str, given: Mapping[str, float | str]) -> 
 
 
 def units_of_axes(scenario: Scenario) -> dict[str, str]:
-    """Unit of the position that each axis controls, by its motor."""
-    return {motor: scenario.train().angle_unit(scenario.controlled(motor)) for motor in scenario.axes()}
+    """Unit of the position that each axis follows, by its motor."""
+    return {motor: scenario.train().angle_unit(shaft) for motor, (_, shaft) in pointed(scenario).items()}
 
 
 OneRun = tuple[np.ndarray, dict[str, np.ndarray], dict[str, np.ndarray]]
@@ -332,11 +358,22 @@ def _different(
 
 
 def _run(scenario: Scenario) -> OneRun:
-    result = run(scenario, energy=False)
-    found, measured = {}, {}
+    return _errors(scenario, run(scenario, energy=False))
+
+
+def _errors(scenario: Scenario, result: RunArrays) -> OneRun:
+    found, measured, train = {}, {}, scenario.train()
     true = pointing_errors(scenario, result)
     for motor, name in pointing_names(scenario):
         found[motor] = error = true[name]
+        if motor not in scenario.axes():  # a driver counts the steps of its field
+            shaft = pointed(scenario)[motor][1]
+            ratio = turns(train, train.motors[motor].shaft, shaft)
+            assert ratio is not None
+            counted = result[train.command_of(motor)] / ratio
+            place = result[train.angle_of(shaft)]
+            measured[motor] = place - place[0] - (counted - counted[0])
+            continue
         controller = scenario.axes()[motor]
         target = controller.reference.at(result.time)[0]
         # The load is at the reference less its error.

@@ -5,12 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 
+from ..control.command import MOST_MICROSTEPS
 from ..model.linear_train import LINEAR_DRIVES
 from ..simulation.scenario.scenario import Scenario
 
 Tables = dict[str, Any]
 K = TypeVar("K")
 
+FINE = 50_000  # microsteps of a run whose steps are taken away
 SCREW_LOSSES = ("efficiency", "backdriving_efficiency", "mean_diameter", "friction_coefficient", "friction_angle")
 
 
@@ -50,6 +52,45 @@ def _low_stiffness(data: Tables) -> None:
 def _hysteresis(data: Tables) -> None:
     for gear in (*data["gears"].values(), *linear_drives(data)):
         gear.pop("hysteresis", None)
+
+
+def _transmission_error(data: Tables) -> None:
+    for gear in data["gears"].values():
+        gear.pop("transmission_error", None)
+    for drive in linear_drives(data):
+        drive.pop("pitch_error", None)
+
+
+def _of_steppers(data: Tables) -> Iterator[Tables]:
+    """Tables of the drivers that make steps of a reference."""
+    for command in data.get("command", {}).values():
+        stepping = command.get("stepping")
+        if stepping is not None and stepping.get("pulses") is None:
+            yield stepping
+
+
+def _microsteps(data: Tables) -> None:
+    """Finer ones: so many that a run has about `FINE` of them, and at least four times as many as they are."""
+    scenario = Scenario(**data)
+    for motor, command in data.get("command", {}).items():
+        for stepping in _of_steppers({"command": {motor: command}}):
+            field = scenario.signals()[scenario.train().command_of(motor)]
+            made, given = len(field.breakpoint_list()), stepping.get("microsteps", 1)
+            own = given
+            while (2 * made <= FINE or own < 4 * given) and 2 * own <= MOST_MICROSTEPS:
+                made, own = 2 * made, 2 * own
+            stepping["microsteps"] = own
+
+
+def _sine_table(data: Tables) -> None:
+    for stepping in _of_steppers(data):
+        stepping["table_error"] = 0.0
+
+
+def _detents(data: Tables) -> None:
+    for motor in data["motors"].values():
+        if "detent_torque" in motor:
+            motor["detent_torque"] = 0.0
 
 
 def _friction(data: Tables) -> None:
@@ -112,6 +153,10 @@ CAUSES: dict[str, Callable[[Tables], None]] = {
     "backlash": _backlash,
     "low stiffness": _low_stiffness,
     "hysteresis": _hysteresis,
+    "transmission error": _transmission_error,
+    "microsteps": _microsteps,
+    "sine table of the driver": _sine_table,
+    "detents": _detents,
     "dry friction": _friction,
     "losses of the gears": _losses,
     "encoder steps": _quantisation,

@@ -122,7 +122,7 @@ def faster(factor: float) -> Change:
 
     def change(data: Tables) -> None:
         targets = [c["reference"].get("target") for c in data["controllers"].values()]
-        if not all(target is not None and "speed" in target for target in targets):
+        if not targets or not all(target is not None and "speed" in target for target in targets):
             return
         for target in targets:
             target["speed"] = factor * target["speed"]

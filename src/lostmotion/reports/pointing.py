@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
@@ -18,6 +19,7 @@ from .pages import table_csv
 from .panels import Bars, Curve, Group, Panel
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
+ARCSEC = 648_000.0 / math.pi
 ROUNDING = 1e-12  # [rad, m], below which an error is rounding
 
 
@@ -83,6 +85,8 @@ def _dotted(k: int) -> dict[str, Any]:
 
 def _unit(budget: PointingBudget, axis: str | None = None) -> tuple[float, str]:
     """In which errors are shown: how many of one rad or m, and the unit of an axis, or of all."""
+    if budget.orders and set(_units(budget, axis)) == {"rad"}:  # axes of steppers are those of mounts
+        return ARCSEC, "arcsec"
     factor, prefix = (1e6, "µ") if max(e.peak for e in budget.whole.values()) < 5e-5 else (1e3, "m")
     return factor, " or ".join(f"{prefix}{unit}" for unit in _units(budget, axis))
 
@@ -180,7 +184,8 @@ def _bars(budget: PointingBudget) -> Group:
 
 def verdict_of(budget: PointingBudget) -> Verdict | None:
     """Whether errors keep their limits and the target stays in view, where there are limits or an angle of view."""
-    points = [_limit_point(budget, axis, limit) for axis, limit in budget.limits.items()]
+    points = [Point("does not fit", f"{lost}") for lost in budget.lost if lost.times]
+    points += [_limit_point(budget, axis, limit) for axis, limit in budget.limits.items()]
     if budget.view is not None and budget.view.share < 1.0:
         points.append(
             Point("does not fit", f"the target is out of view for {excess(1.0 - budget.view.share)} of the time")
@@ -198,6 +203,24 @@ def _limit_point(budget: PointingBudget, axis: str, limit: float) -> Point:
         over = excess(budget.whole[axis].peak / limit - 1.0)
         return Point("does not fit", f"{axis}: peak error {peak} {unit}, {over} above its limit of {most} {unit}")
     return Point("fits", f"{axis}: peak error {peak} {unit}, within its limit of {most} {unit}")
+
+
+def order_header(budget: PointingBudget) -> tuple[str, ...]:
+    """Header of the errors by order."""
+    return ("axis", f"amplitude [{_unit(budget)[1]}]", "order of its shafts", "cause")
+
+
+def order_rows(budget: PointingBudget) -> list[list[str]]:
+    """Periodic errors of steppers at constant speed, the largest first; or why there are none."""
+    rows, (factor, _) = [], _unit(budget)
+    for axis, found in budget.orders.items():
+        if isinstance(found, str):
+            rows.append([axis, "", "", f"none by order: {found}"])
+            continue
+        for line in found.lines:
+            orders = ", ".join(f"{order:.6g} of {shaft}" for shaft, order in line.orders.items())
+            rows.append([axis, f"{factor * line.amplitude:.4g}", orders, line.cause])
+    return rows
 
 
 def _verdict(budget: PointingBudget) -> Verdict | tuple[str, ...]:
@@ -262,6 +285,8 @@ def pointing_report(name: str, budget: PointingBudget) -> Report:
     more: list[Table | Group | Prose] = [Table("Budget", header(budget), rows, BUDGET, chosen=as_it_is)]
     if parts:
         more += [_bars(budget), Table("Contributions", contribution_header(budget), parts)]
+    if by_order := order_rows(budget):
+        more.append(Table("Error at constant speed by order", order_header(budget), by_order))
     if speed:
         more.append(Group("speed", "Error over target speed", "", tuple(speed), min(2, len(speed))))
     if robustness:

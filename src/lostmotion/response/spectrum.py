@@ -9,8 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.controller import Controller
-from ..control.references import PositionReference
+from ..control.references import PositionReference, SlideReference
 from ..control.turning import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
@@ -18,6 +17,7 @@ from ..inputs.quantities import Number, Time
 from ..inputs.validation import did_you_mean, shown
 from ..model.angle_torques import AngleCurve, Harmonic, PositionHarmonic
 from ..model.train import DriveTrain
+from ..simulation.runs.pointing_error import pointed
 from ..simulation.runs.run import run
 from ..simulation.scenario.scenario import Scenario
 
@@ -27,6 +27,8 @@ if TYPE_CHECKING:
 AGAINST = ("reference", "motor")
 PER_PERIOD = 32  # samples of the run in one period of the highest order
 LEAST_ORDER = 64.0  # highest order per turn of the motor, where no part states a high one
+ABOVE_STEPS = 2.2  # the same of microsteps, whose orders are high
+INSTANTS = 1001  # at which the speed of a reference is looked at
 ABOVE = 4.0  # times the highest order that a part states, up to which lines are looked for
 MOST_SAMPLES = 4_000_000  # of a run
 STEADY = 0.02  # by which the mean speeds of both halves of the evaluated part may differ
@@ -170,30 +172,37 @@ def spectrum(
     name = _motor(train, motor)
     over = train.motors[name].shaft
     controller = long.axes().get(name)
-    follows = isinstance(controller, Controller) and isinstance(controller.reference, PositionReference)
-    against = against or ("reference" if follows else "motor")
-    if against == "reference" and not follows:
+    followed = pointed(long).get(name)
+    against = against or ("reference" if followed else "motor")
+    if against == "reference" and not followed:
         raise InputError("against: this axis follows no position reference; take motor, the transmission error")
-    shaft = getattr(controller, "shaft", None) or list(train.shafts)[-1]
+    shaft = followed[1] if followed else getattr(controller, "shaft", None) or list(train.shafts)[-1]
     ratio = turns(train, over, shaft)
     if ratio is None:
         raise InputError(f"motor: {shown(name)} does not turn the shaft {shaft} through gears; name another motor")
     sources = list(_sources(long, train, over))
     stated = max((order for _, order, _ in sources if order <= 1e5), default=0.0)
-    highest = max(LEAST_ORDER, ABOVE * stated) if max_order is None else float(max_order)
+    steps = list(_steps(long, name))
+    fastest = max((ABOVE_STEPS * order for _, order, _ in steps), default=0.0)
+    sources += steps
+    smooth = followed[0] if followed and train.motors[name].kind == "stepper" else None
+    window = _window(long, train, over, start, smooth, ratio)
+    fastest = min(fastest, math.pi * MOST_SAMPLES / (PER_PERIOD * abs(window[1]) * long.simulation.duration))
+    highest = max(LEAST_ORDER, ABOVE * stated, fastest) if max_order is None else float(max_order)
     if not highest > 0.0:
         raise InputError(f"max_order: {highest:g} must be above 0")
-    window = _window(long, train, over, start)
     data, first = _sampled(long, over, window, highest)
     time, angle, speed = _of(data, train, over)
     _, place, rate = _of(data, train, shaft)
     error, error_rate = angle / ratio - place, speed / ratio - rate
     if against == "reference":
-        assert isinstance(controller, Controller)
-        value, slope = controller.reference.at(time)[:2]
+        assert followed is not None
+        value, slope = followed[0].at(time)[:2]
         error, error_rate = value - place, slope - rate
+    if smooth is not None:  # a rotor swings in its field: angles are those of its reference
+        angle, speed = (ratio * x for x in smooth.at(time)[:2])
     per_turn = {n: 1.0 / r for n in train.shafts if not train.is_slide(n) and (r := turns(train, over, n)) is not None}
-    direction = math.copysign(1.0, speed[-1])
+    direction = math.copysign(1.0, window[1])
     travelled = direction * (angle - angle[first])
     made = _whole_turns(travelled[-1] / (2.0 * math.pi), per_turn)
     wanted, found, resampling = _over_whole_turns(
@@ -257,13 +266,27 @@ def _of(data: xarray.Dataset, train: DriveTrain, shaft: str) -> tuple[np.ndarray
     return data["time"].values, data[train.angle_of(shaft)].values, data[train.speed_of(shaft)].values
 
 
-def _window(long: Scenario, train: DriveTrain, over: str, start: float | None) -> tuple[float, float]:
-    """Begin of the evaluated part [s], and the speed of the motor in it [rad/s]; refused where that is not constant."""
+def _window(
+    long: Scenario,
+    train: DriveTrain,
+    over: str,
+    start: float | None,
+    smooth: PositionReference | SlideReference | None,
+    ratio: float,
+) -> tuple[float, float]:
+    """Begin of the evaluated part [s], and the speed of the motor in it [rad/s]; refused where that is not constant.
+
+    smooth: reference of a stepper, whose speed counts in place of that of the rotor.
+    """
     duration = long.simulation.duration
     begin = 0.5 * duration if start is None else start
     if not 0.0 <= begin < duration:
         raise InputError(f"start: {begin:g} s must lie between 0 and the end of the run, {duration:g} s")
-    time, angle, speed = _of(run(long, energy=False).dataset(), train, over)
+    if smooth is None:
+        time, angle, speed = _of(run(long, energy=False).dataset(), train, over)
+    else:
+        time = np.linspace(0.0, duration, INSTANTS) * (1.0 - WHOLE)  # a reference may end with the run
+        angle, speed = (ratio * x for x in smooth.at(time)[:2])
     middle = 0.5 * (begin + duration)
     at = np.interp([begin, middle, duration], time, angle)
     halves = np.diff(at) / (middle - begin)
@@ -378,6 +401,21 @@ def _cause(order: float, width: float, sources: list[tuple[str, float, bool]]) -
     if len(named) == 1:
         return named[0]
     return f"not decided: {' or '.join(named)}" if named else NOT_STATED
+
+
+def _steps(long: Scenario, motor: str) -> Iterator[tuple[str, float, bool]]:
+    """The same of a stepper: its microsteps, and what repeats with each full step."""
+    m, command = long.train().motors[motor], long.tables.command.get(motor)
+    if m.kind != "stepper" or command is None or command.stepping is None:
+        return
+    assert m.steps_per_revolution is not None
+    full, stepping = m.steps_per_revolution, command.stepping
+    yield f"microsteps of {motor}", full * stepping.microsteps, True
+    if stepping.table_error > 0.0 and stepping.microsteps > 1:
+        yield f"sine table of the driver of {motor}", full, False
+    if m.detent_torque:
+        yield f"detents of {motor}", full, False
+        yield f"detents of {motor}", 2.0 * full, False
 
 
 def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str, float, bool]]:

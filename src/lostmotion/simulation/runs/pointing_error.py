@@ -6,31 +6,57 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ...control.references import PositionReference, SlideReference
 from ..scenario.scenario import Scenario
 from .results import RunArrays
 
 NAME = "pointing_error"
 
 
-def pointing_names(scenario: Scenario) -> Iterator[tuple[str, str]]:
-    """Motor and name of the error, for each axis that follows a position."""
+def pointed(scenario: Scenario) -> dict[str, tuple[PositionReference | SlideReference, str]]:
+    """Position that each axis follows, and the shaft or slide that follows it, by its motor: by a loop, or by the steps of a stepper."""
+    found: dict[str, tuple[PositionReference | SlideReference, str]] = {}
+    last = list(scenario.train().shafts)[-1] if scenario.train().shafts else ""
     for motor, controller in scenario.axes().items():
-        if controller.reference.kind == "position":
-            yield motor, f"{scenario.prefix(motor)}{NAME}"
-
-
-def pointing_errors(scenario: Scenario, result: RunArrays) -> dict[str, np.ndarray]:
-    """The reference less the true angle of its shaft [rad] over time, by name; with a camera the reference is where the target is."""
-    found = {}
-    for motor, name in pointing_names(scenario):
-        controller = scenario.axes()[motor]
-        found[name] = controller.reference.at(result.time)[0] - _angle(scenario, result, controller.shaft)
+        if isinstance(controller.reference, PositionReference | SlideReference):
+            found[motor] = controller.reference, controller.shaft or last
+    for motor, command in scenario.tables.command.items():
+        stepping = command.stepping
+        if stepping is not None and (reference := stepping.reference or stepping.travel) is not None:
+            found[motor] = reference, stepping.shaft or last
     return found
 
 
-def _angle(scenario: Scenario, result: RunArrays, shaft: str | None) -> np.ndarray:
+def pointing_names(scenario: Scenario) -> Iterator[tuple[str, str]]:
+    """Motor and name of the error, for each axis that follows a position."""
+    for motor in pointed(scenario):
+        yield motor, f"{scenario.prefix(motor)}{NAME}"
+
+
+def pointing_errors(scenario: Scenario, result: RunArrays) -> dict[str, np.ndarray]:
+    """The reference less the true angle of its shaft [rad] over time, by name; with a camera the reference is where the target is.
+
+    A stepper moves its shaft by as much as its reference moves: there the reference begins where the shaft is.
+    """
+    found = {}
+    for motor, name in pointing_names(scenario):
+        place = _angle(scenario, result, pointed(scenario)[motor][1])
+        found[name] = target(scenario, motor, result.time, float(place[0])) - place
+    return found
+
+
+def target(scenario: Scenario, motor: str, time: np.ndarray, start: float) -> np.ndarray:
+    """Position that an axis follows over time [rad, m]; of a stepper from where its shaft begins."""
+    reference, _ = pointed(scenario)[motor]
+    wanted: np.ndarray = reference.at(time)[0]
+    if scenario.train().motors[motor].kind == "stepper":
+        wanted = start + wanted - float(reference.at(np.zeros(1))[0][0])
+    return wanted
+
+
+def _angle(scenario: Scenario, result: RunArrays, shaft: str) -> np.ndarray:
     train = scenario.train()
-    name = train.angle_of(shaft or list(train.shafts)[-1])
+    name = train.angle_of(shaft)
     if name in result:
         return result[name]
     (gear,) = train.gears.values()  # of a drive, whose results have no angle of the motor
