@@ -140,6 +140,12 @@ def servo(
         asked = {"--tune": rule, "--window": window, "--motor": motor, "--drive-units": drive_units or None}
         _certify(loaded, scenario, directories, pictures, asked)
         return
+    from ..simulation.runs.pointing_error import pointed
+
+    if not loaded.axes() and pointed(loaded):
+        asked = {"--tune": rule, "--drive-units": drive_units or None, "-o": output or None}
+        _open_loop(loaded, scenario, motor, window, asked)
+        return
     from ..servo.commission import commission, work
 
     with about(scenario):
@@ -181,6 +187,33 @@ def _print_drive_units(scenario: Scenario, motor: str | None) -> None:
 
     print("In the units of drives:")
     print("\n".join(f"  {line}" for line in drive_units(scenario, motor)))
+
+
+def _open_loop(
+    loaded: Scenario, source: str, motor: str | None, window: str | None, asked: Mapping[str, object]
+) -> None:
+    """Print what can be said of the axis of a stepper, which has no loop."""
+    from ..errors import InputError
+    from ..servo.open_loop import NO_LOOP, open_loop
+    from ..simulation.runs.pointing_error import pointed
+    from ..units.conversion import si_value
+
+    if given := [option for option, value in asked.items() if value is not None]:
+        raise InputError(f"{', '.join(given)}: {NO_LOOP}; leave it out")
+    within = None
+    if window is not None:
+        axes = pointed(loaded)
+        shaft = axes.get(motor or "", next(iter(axes.values())))[1]
+        try:
+            within = si_value(window, loaded.train().angle_unit(shaft))
+        except ValueError as error:
+            raise InputError(f"--window: {window} {error}") from None
+    with about(source), busy("Running the axis"):
+        found = open_loop(loaded, motor=motor, window=within)
+    print(loaded.title or Path(source).stem)
+    _print_columns(found.summary())
+    print(f"Next: lostmotion track {source}")
+    conclude(found.verdict)
 
 
 def _certify(
