@@ -11,7 +11,7 @@ from lostmotion.sizing.axis_rules import least, with_safety
 from lostmotion.sizing.finding import Finding, within
 from lostmotion.studies.selection.nearest_misses import Miss, _rounded_up
 from lostmotion.studies.selection.ranking import Candidate
-from lostmotion.units.practical import ROUNDING, counted, excess, share_of_limit, told_apart
+from lostmotion.units.practical import ROUNDING, counted, excess, part_of_whole, share_of_limit, told_apart
 
 LIMITS = st.floats(1e-6, 1e6)
 MISSED = st.floats(2e-9, 1e4)
@@ -87,6 +87,16 @@ def test_an_excess_is_never_0_percent(share: float) -> None:
 @given(use=st.floats(0.0, 1.0))
 def test_a_share_that_keeps_a_limit_is_at_most_100_percent(use: float) -> None:
     assert percents(share_of_limit(use))[0] <= 100.0
+
+
+@given(share=st.floats(0.0, 1.0))
+@example(share=1e-12)
+@example(share=1.0 - 1e-12)
+def test_a_part_is_nothing_or_all_only_where_it_is(share: float) -> None:
+    said = part_of_whole(share)
+    assert (said == "0 %") == (share == 0.0)
+    assert (said == "100 %") == (share == 1.0)
+    assert abs(float(re.findall(r"\d+", said)[0]) - 100.0 * share) <= 1.0
 
 
 def test_texts_that_need_not_differ_have_four_digits() -> None:

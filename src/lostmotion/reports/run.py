@@ -15,7 +15,7 @@ from ..simulation.runs.switchings import ATTRIBUTE as SWITCHINGS
 from ..simulation.runs.switchings import MESH_STEP, names_in, unpacked
 from ..simulation.scenario.field_oriented_motors import errors_of
 from ..simulation.scenario.scenario import Scenario
-from ..units.practical import charted, counted, printed
+from ..units.practical import charted, counted, part_of_whole, printed
 from ..verdict import Point, Verdict
 from .run_loops import lines_of, loop_errors, points_of
 
@@ -234,7 +234,7 @@ def _stuck(result: xarray.Dataset | RunArrays) -> list[tuple[float, str]]:
     names = (v.name for v in recorded_variables(result.attrs))
     for name in (n for n in names if n.endswith("_contact") and n in result and n not in flanks):
         stuck = float(np.average(np.asarray(result[name]) == 0, weights=share))
-        found.append((stuck, f"{name.removesuffix('_contact').replace('_', ' ')} {100.0 * stuck:.0f} %"))
+        found.append((stuck, f"{name.removesuffix('_contact').replace('_', ' ')} {part_of_whole(stuck)}"))
     return found
 
 

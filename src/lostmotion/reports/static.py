@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 
+from ..units.practical import part_of_whole
 from .contours import ticks
 from .packed import colour_name, dashes
 from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Panel
@@ -289,7 +290,7 @@ def _contacts(chart: Contacts) -> str:
         m = np.asarray(modes)[:-1]
         top = row * k + 18.0
         edges = np.concatenate([[0], np.flatnonzero(np.diff(m)) + 1, [len(m)]])
-        share = f"{label}: stuck {100.0 * float(np.mean(m == 0)):.0f} %"
+        share = f"{label}: stuck {part_of_whole(float(np.mean(m == 0)))}"
         parts.append(f'<text class="tick start" x="{LEFT}" y="{top - 4}">{escape(share)}</text>')
         boxes: dict[int, list[str]] = {-1: [], 0: [], 1: []}
         for a, b in pairwise(edges.tolist()):

@@ -72,6 +72,14 @@ def share_of_limit(use: float) -> str:
     return f"{percent} %"
 
 
+def part_of_whole(share: float) -> str:
+    """A share in percent: 0 % only where it is nothing, and 100 % only where it is all."""
+    percent = round(100.0 * share)
+    if percent == 0 and share > 0.0:
+        return "less than 1 %"
+    return "more than 99 %" if percent == 100 and share < 1.0 else f"{percent} %"
+
+
 def charted(unit: str, *, small: bool = False) -> tuple[str, float]:
     """Unit of a chart or a summary for an SI unit, and how many of them one is."""
     found = CHARTED_SMALL.get(unit) if small else None
