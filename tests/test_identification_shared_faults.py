@@ -64,6 +64,15 @@ def test_a_sensor_that_stops_in_a_motion_is_frozen(noise: float, value: str) -> 
     assert frozen_stretches(angle) == [(250, 310)]
 
 
+@pytest.mark.parametrize("begin", [250, 450, 650])
+def test_a_sensor_that_stops_for_ever_is_frozen_however_slowly_it_moved(begin: int) -> None:
+    """It has noise while it moves, and none from then on; the motion is slow where it stops, as at a reversal."""
+    time = TIME - TIME[begin]
+    angle = 1.0 - np.cos(3.0 * time) + 1e-3 * np.random.default_rng(1).normal(size=len(time))
+    angle[begin:] = angle[begin]
+    assert frozen_stretches(angle) == [(begin, len(angle))]
+
+
 def test_another_channel_that_moves_tells_a_frozen_sensor_from_a_load_at_rest() -> None:
     angle = stuck()
     begin, end = max(

@@ -275,7 +275,10 @@ def _at_rest(x: np.ndarray, begin: int, end: int, others: Sequence[np.ndarray]) 
     ends = [step[k] for k in (begin - 1, end - 1) if 0 <= k < len(step)]
     if end < len(x) and max(ends) <= np.nanmedian(step[step > 0.0]):
         return True
-    second, third = (float(np.nanmedian(np.abs(np.diff(x[np.isfinite(x)], order)))) for order in (2, 3))
+    moving = x.copy()
+    for first, last in constant_stretches(x):
+        moving[first:last] = np.nan
+    second, third = (float(np.nanmedian(np.abs(np.diff(moving, order)))) for order in (2, 3))
     # Third differences of white noise are 1.8 times the second ones; those of a smooth motion are far smaller.
     resolution = float(np.min(step[step > 0.0]))
     if third > 0.9 * second and second > 4.0 * resolution:
