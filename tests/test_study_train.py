@@ -115,6 +115,17 @@ def test_interrupted_and_started_again_it_has_the_same_rows(tmp_path: Path):
     assert read_table(lm.study(study, tmp_path / "s")).equals(read_table(whole))
 
 
+def test_a_stored_study_of_an_axis_names_keys_as_its_file_does() -> None:
+    axis = lm.load("ball-screw-axis")
+    vary = [{"key": "axis.slide.mass", "grid": [10.0, 20.0, 2]}]
+    study = lm.studies.Study(scenario=axis, vary=vary, keep={"peak": "peak(slide_speed)"})
+    again = from_json(to_json(study))
+    assert to_json(again) == to_json(study)
+    with pytest.raises(lm.InputError) as refused:
+        again.scenario_at(np.array([-1.0]))
+    assert refused.value.problems[0].keys == ("axis.slide.mass",)
+
+
 def test_a_study_of_a_train_is_text_and_back(tmp_path: Path):
     study = make()
     again = from_json(to_json(study))

@@ -10,6 +10,7 @@ from ...errors import InputError, prefixed
 from ...inputs.arguments import checked
 from ...inputs.toml_files import read_toml
 from ...simulation.forms.axis_form import is_axis, long_form
+from ...simulation.forms.key_aliases import AXIS
 from ...simulation.runs.loading import load
 from ...simulation.runs.result_files import FORMATS
 from ...simulation.scenario.scenario import Scenario
@@ -83,10 +84,12 @@ def from_json(text: str) -> Study:
     """The study that `to_json` wrote."""
     data = json.loads(text)
     base = data["scenario"]
-    data["scenario"] = Scenario(**base)
+    scenario = Scenario(**base)
+    data["scenario"] = Scenario.of(scenario.tables, AXIS, checked=False) if data.pop("axis", False) else scenario
     return Study(**data)
 
 
 def to_json(study: Study) -> str:
     """All of a study, the base scenario included."""
-    return study.model_dump_json(exclude_none=True)
+    text = study.model_dump_json(exclude_none=True)
+    return f'{text.removesuffix("}")},"axis":true}}' if study.scenario.form == AXIS else text
