@@ -1,4 +1,4 @@
-// The places that a kernel has for what a layout orders.
+// Copies between arrays in the order of a layout and the vectors of a kernel.
 #pragma once
 
 #include <algorithm>
@@ -10,7 +10,7 @@
 #include "lostmotion/solver/components.hpp"
 
 namespace lostmotion::model {
-
+// Index, in a state of the kernel, of state k of the layout: coupled states stand first, in D::coupled places.
 template <class D>
 int state_place(const Layout& n, int k) {
     return k < n.coupled ? k : D::coupled + k - n.coupled;
@@ -18,13 +18,13 @@ int state_place(const Layout& n, int k) {
 
 inline Counts counts_of(const Layout& n) { return {n.coupled, n.angles, n.inputs, n.memory}; }
 
-// A state of the kernel, by the layout.
+// Writes a state of the kernel to `to`, in the order of the layout.
 template <class D, class State, class To>
 void unpack_state(const State& x, const Layout& n, To to) {
     for (int k = 0; k < n.states; ++k) *to++ = x[state_place<D>(n, k)];
 }
 
-// One signal for each input.
+// Signals of the inputs, at least one.
 template <class D>
 SignalsOf<D> packed_signals(const std::vector<Signal>& inputs) {
     SignalsOf<D> signals;
@@ -32,7 +32,7 @@ SignalsOf<D> packed_signals(const std::vector<Signal>& inputs) {
     std::copy(inputs.begin(), inputs.end(), signals.begin());
     return signals;
 }
-// x: the states by the layout of the assembly, or nothing for rest.
+// Start of a run. x: states in the order of the layout; empty: rest.
 template <class D>
 StartOf<D> packed_start(const Layout& n, std::span<const double> x, std::span<const double> memory) {
     StartOf<D> start;

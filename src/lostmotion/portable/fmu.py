@@ -315,7 +315,7 @@ def _given_motion(shaft: str, *, slide: bool) -> tuple[Declared, Declared]:
     """The inputs that give the motion of a shaft or a slide."""
     kind, unit = ("slide", "m/s") if slide else ("shaft", "rad/s")
     return (
-        Declared(f"{shaft}_given_speed", unit, f"speed that the {kind} has at the begin of a step", 0.0),
+        Declared(f"{shaft}_given_speed", unit, f"speed that the {kind} has at the start of a step", 0.0),
         Declared(f"{shaft}_given_acceleration", f"{unit}^2", f"acceleration that the {kind} has", 0.0),
     )
 

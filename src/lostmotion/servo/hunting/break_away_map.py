@@ -107,7 +107,7 @@ class SlipsFromInterval:
         return float(low.min()), float(high.max())
 
     def transients(self, times: np.ndarray) -> Transients:
-        """Transients at the begin of the stuck interval, if the slip ends between the first instant and the last."""
+        """Transients at the start of the stuck interval, if the slip ends between the first instant and the last."""
         rows = self.contact.transients
         return Transients(*self.boxes(rows, times))
 

@@ -94,13 +94,13 @@ def _share(contact: StickSlip, error: float) -> tuple[float, str]:
 
 
 def _about(after: Transients, before: Transients) -> Transients:
-    """A little more than what follows, for a next step to lie within."""
+    """Transients somewhat larger than those after a slip, so that the next step may lie within them."""
     change = np.minimum(SLACK * np.abs(after.middle - before.middle), NEAR * np.abs(after.middle))
     return Transients(after.middle, SLACK * after.radius + change)
 
 
 def _in_proportion(contact: StickSlip, found: Image, error: float) -> Transients | None:
-    """Transients after a slip, where the error that it leaves has grown to another one."""
+    """Transients after a slip, scaled to the error from which the next slip is examined; None if they are not small."""
     if found.low > 0.0:  # it goes on in its direction; all is in proportion
         factor, off = error / found.middle, 0.5 * (found.high - found.low) / found.low
         grown = found.left.times(factor)
@@ -148,7 +148,10 @@ def _orbit(contact: StickSlip) -> tuple[list[float], str]:
 
 
 def _kept(contact: StickSlip, low: float, high: float) -> tuple[Transients | tuple[float, float] | None, str]:
-    """Bound of the transients with which the map takes a band into itself; else the band that it takes it to, if there is one, and why."""
+    """(bound of the transients with which the map takes a band into itself, "").
+
+    If there is none: (the band that contains the image, if it is known, and the reason).
+    """
     left = Transients.none(contact)
     for _ in range(ROUNDS):
         images = _images(contact, low, high, left)
@@ -180,10 +183,10 @@ def _leading_to(
             if images[k] is None:
                 images[k] = image(contact, a, b, Transients(left.middle, radius[k]))
         found = [one for one in images if one is not None]
-        led, before = _led(edges, found, inside), radius.copy()
+        led, before = _cells_that_reach(edges, found, inside), radius.copy()
         for one, here in zip(found, led, strict=True):
             if here:
-                first, last = _met(edges, one)
+                first, last = _cells_met_by(edges, one)
                 grown = np.any(one.left.largest > radius[first:last], axis=1)
                 radius[first:last][grown] = np.maximum(radius[first:last], SLACK * one.left.largest)[grown]
         changed = np.any(radius > before, axis=1)
@@ -198,12 +201,13 @@ def _leading_to(
     return ((low, high),)
 
 
-def _met(edges: np.ndarray, found: Image) -> tuple[int, int]:
-    """The first cell that an image meets, and the one after the last."""
+def _cells_met_by(edges: np.ndarray, found: Image) -> tuple[int, int]:
+    """Index of the first cell that an image overlaps, and the index after the last."""
     return int(np.searchsorted(edges, found.least, "right")) - 1, int(np.searchsorted(edges, found.largest, "left"))
 
 
 def _kept_with(contact: StickSlip, low: float, high: float, left: Transients) -> bool:
+    """Whether the map takes a band of errors into itself, with transients within the given ones."""
     return all(not i.reason and low <= i.least <= i.largest <= high for i in _images(contact, low, high, left))
 
 
@@ -212,14 +216,15 @@ def _images(contact: StickSlip, low: float, high: float, left: Transients) -> li
     return [image(contact, a, b, left) for a, b in itertools.pairwise(np.linspace(low, high, CELLS + 1))]
 
 
-def _led(edges: np.ndarray, images: list[Image], inside: np.ndarray) -> np.ndarray:
+def _cells_that_reach(edges: np.ndarray, images: list[Image], inside: np.ndarray) -> np.ndarray:
+    """Cells whose errors reach the band: those inside it, and those whose image lies in cells that reach it."""
     led = inside.copy()
     while True:
         before = led.copy()
         for k, found in enumerate(images):
             if led[k] or found.reason or found.least == 0.0 or found.largest > edges[-1]:
                 continue
-            led[k] = bool(led[slice(*_met(edges, found))].all())
+            led[k] = bool(led[slice(*_cells_met_by(edges, found))].all())
         if np.array_equal(led, before):
             return led
 

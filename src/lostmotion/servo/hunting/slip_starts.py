@@ -1,4 +1,9 @@
-"""Pieces of the starts of a slip, over which the state is affine: strips of one number between two lines of another."""
+"""Pieces of the set of states at the start of a slip, over which the state is an affine function.
+
+A start has two unknowns: the angle ``x`` within the encoder step, and the torque ``w`` as a share of its rise over the
+sample time. A piece is a trapezium of the (w, x) plane: a strip of ``w`` between two straight lines of ``x``. The state
+is ``centre + slope w``, its angle also ``+ x``, up to ``radius``.
+"""
 
 from __future__ import annotations
 
@@ -15,13 +20,13 @@ ROUNDING = 1e-9  # of an encoder step, and of torque and speed, by which pieces 
 
 @dataclass
 class Pieces(Sets):
-    """Pieces of the starts, after the same sample."""
+    """Pieces of the states of slips, all after the same number of samples."""
 
-    slope: np.ndarray  # g, (piece, state); the centre is c
-    radius: np.ndarray  # bound of what is not affine
+    slope: np.ndarray  # change of the state with w, (piece, state)
+    radius: np.ndarray  # bound of the deviation from the affine function
     strip: np.ndarray  # least and largest w, (piece, 2)
-    below: np.ndarray  # least x at both
-    above: np.ndarray  # largest x at both
+    below: np.ndarray  # least x at both values of w
+    above: np.ndarray  # largest x at both values of w
 
     def ends(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Values of an output that does not depend on x at both values of w, (piece, 2), and the radius."""
@@ -41,7 +46,7 @@ class Pieces(Sets):
         return least - self.radius[:, 0], most + self.radius[:, 0]
 
     def boxes(self) -> Boxes:
-        """Boxes around them, whose unknowns are x, w, and those of the radius."""
+        """Boxes around the pieces. The unknowns of a box are x, w, and one for each entry of the radius."""
         middle, half = self.strip.mean(axis=1), 0.5 * (self.strip[:, 1] - self.strip[:, 0])
         centre = self.centre + self.slope * middle[:, None]
         low, high = np.minimum(*self.below.T), np.maximum(*self.above.T)
@@ -52,7 +57,7 @@ class Pieces(Sets):
         return out
 
     def moved(self, matrix: np.ndarray, add: np.ndarray | None = None) -> Pieces:
-        """Pieces of the states that a matrix makes of them; all but the states is shared."""
+        """Pieces after a linear map of the state. Strips and lines are shared with the pieces before."""
         centre, slope = self.centre @ matrix.T, self.slope @ matrix.T
         radius = self.radius @ np.abs(matrix).T if self.radius.any() else self.radius
         return replace(self, centre=centre if add is None else centre + add, slope=slope, radius=radius)
@@ -109,7 +114,10 @@ def kept_beside(pieces: Pieces, bound: np.ndarray, side: float) -> tuple[Pieces,
         inner, outer = pieces.below, pieces.above
     else:
         inner, outer = pieces.above, pieces.below
-    reach, over = side * (bound - inner), side * (bound - outer)  # some of it is kept; all of it is kept
+    reach, over = (
+        side * (bound - inner),
+        side * (bound - outer),
+    )  # positive where part of a piece, and where all of it, is kept
     w, width = pieces.strip, pieces.strip[:, 1] - pieces.strip[:, 0]
     some, whole = _zero_between(reach, w), _zero_between(over, w)
     none = math.inf

@@ -1,4 +1,4 @@
-"""Motors under field-oriented control in a run: their torque from their currents, and how far the run may be wrong."""
+"""Motors under field-oriented control: torque computed from currents, and error bounds of a run."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def error_bound(scenario: Scenario, fine: Mapping[str, Any], coarse: Mapping[str
 
 
 def bounded(scenario: Scenario) -> dict[str, str]:
-    """The variables that have a bound, each with the one whose largest value its rounding goes with as well."""
+    """Variables that have an error bound. The value is the variable whose largest magnitude also scales the rounding error."""
     names: dict[str, str] = {}
     for prefix, shaft, _ in oriented(scenario):
         across, torque = f"{prefix}quadrature_current", f"{prefix or 'motor_'}torque"
@@ -73,7 +73,7 @@ def bounded(scenario: Scenario) -> dict[str, str]:
 
 
 def bounds_of(names: Mapping[str, str], largest: Mapping[str, float], apart: Mapping[str, float]) -> dict[str, float]:
-    """Bounds by variable, from the largest values of one run and the largest differences of both."""
+    """Error bounds by variable, from the largest values of the fine run and the largest differences to the coarse run."""
     return {name: apart[name] + AGREEMENT * max(largest[name], largest[other]) for name, other in names.items()}
 
 
@@ -85,13 +85,13 @@ def bound_names(scenario: Scenario) -> Iterator[tuple[str, str, str]]:
 
 
 def bound_values(scenario: Scenario, attributes: Mapping[str, Any], samples: int) -> dict[str, np.ndarray]:
-    """The same of a run with these attributes, the same at each of its samples."""
+    """Error bounds of a run as arrays over its samples, read from the attributes of its result."""
     bounds = json.loads(attributes.get(ATTRIBUTE, "{}"))
     return {title: np.full(samples, bounds[name]) for title, name, _ in bound_names(scenario)}
 
 
 def too_slow(scenario: Scenario, values: Mapping[str, Any]) -> str:
-    """Currents whose sample time is too long for the speed of their rotor in a run; empty if all is well."""
+    """Warning of a sample time that is too long for the speed of the rotor in a run; empty if none is."""
     found = []
     for prefix, shaft, phase in oriented(scenario):
         motor = prefix.removesuffix("_") or "motor"
@@ -107,6 +107,6 @@ def too_slow(scenario: Scenario, values: Mapping[str, Any]) -> str:
 
 
 def errors_of(result: Any) -> dict[str, float]:
-    """The bounds that a result carries, by the names of its variables; empty where there is no field-oriented control."""
+    """Error bounds in the attributes of a result, by variable; empty without field-oriented control."""
     bounds: dict[str, float] = json.loads(result.attrs.get(ATTRIBUTE, "{}"))
     return bounds

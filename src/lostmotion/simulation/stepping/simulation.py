@@ -318,7 +318,7 @@ class Simulation(SimulationAnswers):
     def _begin_and_end(
         self, command: StepInput, load_torque: StepInput, inputs: dict[str, StepInput]
     ) -> tuple[list[float], list[float]]:
-        """The inputs of the core at the begin and the end of an interval."""
+        """The inputs of the core at both ends of an interval."""
         if command is not GIVE:
             inputs[self._the_only("command")] = command
         if load_torque.__class__ is not float or load_torque != 0.0:

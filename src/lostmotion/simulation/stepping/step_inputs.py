@@ -86,7 +86,7 @@ def no_input(train: DriveTrain, inputs: Sequence[str], name: str) -> InputError:
 
 
 def ends_of(name: str, value: Any, unit: str) -> tuple[float, float]:
-    """The values of an input at the begin and the end of an interval.
+    """The values of an input at both ends of an interval.
 
     Raises InputError: it is neither a number nor a pair of numbers.
     """
