@@ -218,7 +218,7 @@ def test_a_rung_without_a_run_of_a_log_held_out_is_not_taken(failing: Identifica
     assert not lower.failed and list(upper.failed) == [e.log for e in failing.errors if e.held_out]
     assert failing.chosen == 0
     (said,) = failing.failures()
-    assert "upper: 2 of 2 logs held out without a run, so that this rung is not taken: 001.json, 004.json" in said
+    assert "upper: 2 of 2 logs held out without a run, so that this model is not chosen: 001.json, 004.json" in said
     assert "friction_torque" in said and said in str(failing)
     page = write_identification(tmp_path, "servo", failing).read_text()
     assert "(2 without a run)" in page and "of 2 logs held out without a run" in page

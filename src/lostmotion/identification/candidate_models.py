@@ -1,4 +1,7 @@
-"""The ladder of models: each rung fitted from the one below, the one with the least held-out error taken."""
+"""Candidate models: each is fitted from the values of the one before, and the one with the least held-out error is chosen.
+
+A rung is the index of a candidate model in the `ladder` of the file. Each has the free parameters of those before and more.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +35,7 @@ PARTS = (1 / 16, 1 / 8, 1 / 4, 1 / 2)  # of the logs, to which a fit is made bef
 LEAST = 50  # samples of the first
 LOWER = 0.02  # of the cost, by which another minimum must be lower: less is where a search happens to end
 TRIED = 2  # of the minima of the scan, from which a fit begins
-GAIN = 0.01  # of the held-out error, by which a higher rung must be better to be taken
+GAIN = 0.01  # of the held-out error, by which a later model must be better to be chosen
 GAIN_UNDETERMINED = 0.05  # the same, where its parameters leave more directions undetermined
 Notify = Callable[[str, int, float], None]
 
@@ -49,7 +52,7 @@ class RungResult:
     held_out: float
     """the same of the logs held out that have a run; NaN without such"""
     failed: dict[str, str]
-    """by log held out that has no run with the values of this rung: why"""
+    """reason by log held out, where it has no run with the values of this model"""
     undetermined: list[Undetermined]
     """unidentifiable parameters of this model"""
     minima: list[Point] = field(default_factory=list)
@@ -57,7 +60,7 @@ class RungResult:
 
     @property
     def error(self) -> float:
-        """By which rungs are compared: that of the logs held out, or where there is none, of those fitted."""
+        """Error by which models are compared: that of the logs held out, or else of those fitted."""
         return self.train if math.isnan(self.held_out) else self.held_out
 
     @property
@@ -85,7 +88,7 @@ def begun_with(task: Identification, train: Sequence[Prepared]) -> list[Prepared
 def climb(
     rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify, models: Models
 ) -> list[RungResult]:
-    """All rungs of the ladder.
+    """Fit all candidate models, one after the other.
 
     models: those that an interrupted identification has fitted: the search goes on from their values.
 
@@ -119,7 +122,7 @@ def climb(
 def _rung(
     rig: Rig, engine: Engine, train: list[Prepared], rung: int, point: Point, below: Fit | None, notify: Notify
 ) -> tuple[Fit, list[Point]]:
-    """(fit of a rung, other minima) from where the rung below has ended."""
+    """(fit of a candidate model, other minima), begun at the values of the model before."""
     task, entry = rig.task, rig.rungs()[rung]
     added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
     if rung > 0:
@@ -132,7 +135,7 @@ def _rung(
             best = fit
     assert best is not None
     if below is not None and _cost(problem_of(rig, engine, train, rung - 1), below, best) < best.cost * (1.0 - 1e-9):
-        # The rung should contain that below: begin there, with what is new switched off.
+        # The model contains the one before: begin there, with the new parameters switched off.
         off = {n: p.off if p.off is not None else p.start for n, p in added.items()}
         again = _one(
             rig, engine, train, rung, replace(below.point, values=below.point.values | off), entry.name, notify
@@ -263,7 +266,7 @@ def _some(
 
 
 def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: Point, notify: Notify) -> Fit:
-    """The lowest rung, fitted to the logs with which a search begins."""
+    """Fit of the first candidate model to the logs with which a search begins."""
     return _some(rig, engine, few, 0, start, lambda iteration, cost: notify(rig.rungs()[0].name, iteration, cost))
 
 
@@ -279,7 +282,7 @@ def mean_errors(task: Identification, errors: list[LogError], fit: Fit) -> tuple
 
 
 def chosen(rungs: Sequence[RungResult]) -> int:
-    """The lowest rung that no higher one betters by more than `GAIN` of the held-out error, or of the error where none is held out.
+    """Index of the first model that no later one betters by more than `GAIN` of the held-out error, or else of the error.
 
     One that leaves more directions undetermined has to gain `GAIN_UNDETERMINED`: its error says little of values that the logs do
     not tell. One with which fewer of the logs held out have no run is better, whatever its error.

@@ -35,7 +35,7 @@ class IdentificationResult:
     rungs: list[RungResult]
     """candidate models, from the first"""
     chosen: int
-    """the rung that is taken"""
+    """index of the chosen model"""
     intervals: dict[str, Interval]
     """95 % intervals of the parameters, SI"""
     undetermined: list[Undetermined]
@@ -97,7 +97,7 @@ class IdentificationResult:
 
     @property
     def error_unit(self) -> str:
-        """Unit of the errors by which rungs are compared."""
+        """Unit of the errors by which models are compared."""
         first, *more = self.task.measured
         return "standard deviations" if more else self.unit(first)
 
@@ -211,14 +211,14 @@ class IdentificationResult:
         return found
 
     def failures(self) -> list[str]:
-        """Logs held out that have no run on a rung, and why; a rung with fewer of them is taken before it."""
+        """Logs held out without a run of a candidate model, and why; a model with fewer of them is preferred."""
         count = sum(log.held_out for log in self.logs)
         least = len(self.rungs[self.chosen].failed)
         found = []
         for rung in self.rungs:
             if rung.failed:
                 first, why = next(iter(rung.failed.items()))
-                less = ", so that this rung is not taken" if len(rung.failed) > least else ""
+                less = ", so that this model is not chosen" if len(rung.failed) > least else ""
                 found.append(
                     f"{rung.name}: {len(rung.failed)} of {count} logs held out without a run{less}: {', '.join(rung.failed)} ({first}: {why})"
                 )

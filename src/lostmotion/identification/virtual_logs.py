@@ -33,7 +33,7 @@ def virtual_log(
     plan: time, header and inputs of the experiment; the measured channels need not be there, but for what formulas take
         of them, such as ``first_position``.
     values: of the parameters and nuisances, SI; others have their start values.
-    rung: of the ladder; -1: the highest.
+    rung: index of the candidate model; -1: the last.
     noise: standard deviations of the measured channels by name, SI.
     seed: of the noise.
 

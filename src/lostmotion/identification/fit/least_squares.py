@@ -49,7 +49,7 @@ class Problem:
     engine: Engine
     logs: Sequence[Prepared]
     rung: int
-    parameters: Mapping[str, FreeParameter]  # free on this rung
+    parameters: Mapping[str, FreeParameter]  # free in this candidate model
     nuisance: Mapping[str, FreeParameter]
     options: FitOptions
     given: np.ndarray | None = None  # deviations of the measured channels, where the task gives them
@@ -282,7 +282,7 @@ def _stepped(problem: Problem, point: Point, linear: _Linear, damping: float) ->
 
 
 def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
-    """The fit of a rung to logs."""
+    """Problem of fitting a candidate model to logs."""
     task = rig.task
     given = list(rig.deviations.values())
     deviations = None if None in given else np.array(given, dtype=float)

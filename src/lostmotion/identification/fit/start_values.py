@@ -53,10 +53,10 @@ class Regression:
 def regressed(
     rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, free: Mapping[str, FreeParameter]
 ) -> tuple[Point, Regression]:
-    """The start of the lowest rung.
+    """Start values of the first candidate model.
 
     logs: that are fitted.
-    free: on the lowest rung.
+    free: parameters of the first candidate model.
     """
     try:
         shown = shown_motion(rig)

@@ -169,7 +169,7 @@ def _residuals(
 
 
 def start_point(task: Identification, logs: Sequence[Prepared]) -> Point:
-    """Start values; parameters of higher rungs are off."""
+    """Start values; parameters of later candidate models are off."""
     first = free_on(task, 0)
     values = {
         name: p.start if name in first or p.fixed or p.off is None else p.off for name, p in task.parameters.items()

@@ -34,7 +34,7 @@ class FreeParameter(Part):
     """a change that matters; left out, a tenth of the start value, or of the range where that is 0"""
     tolerance: Number | None = None
     """with a prior: of the catalogue value `start`, within which it lies with 95 % probability; left out, there is no prior"""
-    off: Number | None = None  #: value on the rungs of the ladder that do not have it; left out, the start value
+    off: Number | None = None  #: value in candidate models in which it is not free; left out, the start value
     fixed: bool = False  #: stays at its start value
     logarithmic: bool = False  #: sought by its logarithm, for what is positive and known to an order of magnitude
 

@@ -91,12 +91,12 @@ class Phase(Part):
 
 
 class Rung(Part):
-    """One rung of the ladder of models: that below, and more free parameters."""
+    """One candidate model: the one before, with more free parameters."""
 
     name: str
-    free: tuple[str, ...] = ()  #: parameters, beside those of the rungs below
+    free: tuple[str, ...] = ()  #: parameters, beside those of the models before
     set: dict[str, Any] = Field(default_factory=dict)
-    """values of the scenario by dotted key, beside those of the rungs below"""
+    """values of the scenario by dotted key, beside those of the models before"""
     multi_start: Elements[tuple[Number, ...]] = Field(default_factory=nothing)
     """values to try of parameters on which the motion does not depend smoothly, SI or text with a unit"""
 
@@ -147,7 +147,7 @@ class Identification(Part):
     nuisance: Elements[FreeParameter] = Field(default_factory=nothing)
     """one value for each log, with a tolerance: initial state, offset, delay"""
     ladder: tuple[Rung, ...] = ()
-    """left out, one rung with all parameters"""
+    """candidate models, from few to many parameters; left out, one with all parameters"""
     fit: FitOptions = FitOptions()
     record: str = ""
     """``gear.NAME`` of the rig, of which a data sheet is written"""
@@ -249,7 +249,7 @@ class Identification(Part):
         return found + ([("logs.held_out", [self.logs.held_out])] if self.logs.held_out is not None else [])
 
     def rungs(self) -> tuple[Rung, ...]:
-        """The ladder; without one, a rung of all free parameters."""
+        """Candidate models; if the file has none, one of all free parameters."""
         free = tuple(name for name, p in self.parameters.items() if not p.fixed)
         return self.ladder or (Rung(name="all parameters", free=free),)
 
@@ -301,6 +301,6 @@ def load_identification(path: str | Path) -> tuple[Identification, Path]:
 
 
 def free_on(task: Identification, rung: int) -> dict[str, FreeParameter]:
-    """Parameters that are sought on a rung."""
+    """Free parameters of a candidate model."""
     names = [name for entry in task.rungs()[: rung + 1] for name in entry.free]
     return {name: p for name, p in task.parameters.items() if name in names and not p.fixed}

@@ -90,7 +90,7 @@ def odd_logs(
 
     logs: all that were fitted or held out.
     start: where the search began.
-    fit: where it ended, on this rung of the model sequence.
+    fit: where it ended, with this candidate model.
 
     Returns list of OddLog: empty if all logs agree, or if fewer than three were fitted.
     Returns Point
