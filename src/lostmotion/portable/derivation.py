@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -21,6 +22,7 @@ Numbers = Callable[[Scenario], np.ndarray]
 
 # Not of the motion: when it is read, and what was asked of the drive.
 _OTHERS = ("simulation", "task", "title")
+_OF_TARGETS = re.compile(r"(^|\.)reference\.target\.")  # their paths are series of arrays, which record nothing
 FROM_ZERO = 0.25  # what a value of 0 is changed to, to see whether it may be another alone
 
 
@@ -70,7 +72,7 @@ def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str],
     values = {
         key: value
         for key, value in values_of(scenario.written)
-        if not (CHANGES_OTHERS.fullmatch(key) or (without and without(key)))
+        if not (CHANGES_OTHERS.fullmatch(key) or _OF_TARGETS.search(key) or (without and without(key)))
         and unit_for(scenario, key) is not None
         and (value or _free(scenario, key))
     }
