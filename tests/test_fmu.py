@@ -156,7 +156,7 @@ def test_steps_have_the_bits_of_python(steps: list[float], drive: Slave) -> None
     assert wanted["motor_torque"] != 0.0
 
 
-@pytest.mark.parametrize("name", ["position-axis", "hunting-with-backlash", "two-motors-one-ring", "field-weakening"])
+@pytest.mark.parametrize("name", ["position-axis", "hunting-with-backlash", "two-motors-one-ring", "field-weakening", "stepper-belt-axis"])
 def test_trains_and_controllers_have_the_bits_of_python(name: str, tmp_path: Path) -> None:
     scenario = lm.load(name)
     interval = scenario.simulation.sample_interval

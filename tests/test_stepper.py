@@ -367,6 +367,27 @@ def test_the_derivative_by_the_holding_torque_is_that_of_differences() -> None:
     assert np.abs(found - (after - before) / (2.0 * h)).max() < 1e-5 * np.abs(found).max()
 
 
+def test_a_batch_of_steppers_makes_the_steps_of_each_alone() -> None:
+    """Fields that turn by a microstep in each step, one of them with half the carriage."""
+    base = lm.load("stepper-belt-axis")
+    scenarios = [base, base.replace(**{"axis.slide.mass": 0.25})]
+    batch, alone = lm.SimulationBatch(scenarios, step=1e-3), [lm.Simulation(s, step=1e-3) for s in scenarios]
+    for k in range(60):
+        field = 2.0 * math.pi / 3200 * np.array([k, 2 * k])
+        batch.step(field)
+        for simulation, angle in zip(alone, field, strict=True):
+            simulation.advance(1e-3, command=angle)
+    for name in ("slide_position", "motor_electrical_angle"):
+        assert batch[name].tolist() == [simulation[name] for simulation in alone]
+
+
+def test_the_live_page_draws_the_electrical_angle() -> None:
+    from lostmotion.live_page.description import describe
+
+    figures = describe(lm.load("stepper-belt-axis"), "belt")["figures"]
+    assert [f["series"][0]["variable"] for f in figures] == ["motor_command", "motor_electrical_angle"]
+
+
 def test_step_by_step_the_field_and_the_current_are_named() -> None:
     base = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", {"axis.motor.standstill_current": 0.5})
     simulation = lm.Simulation(base, step=1e-3)
