@@ -8,6 +8,7 @@ import pytest
 import xarray as xr
 
 import lostmotion as lm
+from lostmotion.simulation.runs.energy_ledger import largest_stored, with_energy
 from lostmotion.simulation.variables import VARIABLES
 
 
@@ -170,3 +171,12 @@ def test_leaving_the_data_of_the_loss_map_is_said(large: Path) -> None:
 def test_the_note_on_the_stand_in_table_travels_with_the_result(result: xr.Dataset) -> None:
     assert "stand-in" in result.attrs["note"]
     assert json.loads(result.attrs["scenario"])["gearbox"]["note"]["losses"] == result.attrs["note"]
+
+
+@pytest.mark.parametrize(("residual", "turned_over", "share"), [(1.9e-39, 5.9e-43, 0.0), (1e-9, 1e-8, 0.1)])
+def test_a_balance_of_energies_that_rounding_makes_is_not_open(residual: float, turned_over: float, share: float) -> None:
+    """A shaft held by friction may have 1e-20 rad/s by rounding; what a torque of 0.5 N·m does in a rounding of a radian is far more."""
+    bound = largest_stored({"motor_torque": np.array([0.5, -0.2]), "load_speed": np.array([1e-20, 0.0])})
+    found = with_energy({}, {"residual": residual, "turned_over": turned_over}, bound)
+    assert found["energy_residual"] == pytest.approx(share)
+    assert ("warning" in found) == (share > 0.0)
