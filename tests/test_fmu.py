@@ -1,5 +1,6 @@
 """FMUs under FMPy: valid, the same bits as step by step in Python, state and rollback, parameters and errors."""
 
+import importlib
 import math
 import subprocess
 import sys
@@ -475,3 +476,21 @@ def test_a_title_that_xml_cannot_hold_is_refused(tmp_path: Path) -> None:
     with pytest.raises(lm.InputError, match=r"title: 'a\\x01b' holds a control character"):
         lm.export_fmu(scenario, tmp_path / "x.fmu")
     assert not list(tmp_path.iterdir())
+
+
+@pytest.mark.parametrize(
+    ("directories", "said"),
+    [
+        (("linux64",), "It runs on Linux x86-64; `make fmu` adds"),
+        (("x86_64-linux", "aarch64-windows"), "It runs on Windows aarch64, Linux x86-64; `make fmu` adds"),
+        (
+            ("linux64", "win64", "darwin64", "aarch64-linux", "aarch64-windows", "aarch64-darwin"),
+            "It runs on macOS aarch64, Linux aarch64, Windows aarch64, macOS x86-64, Linux x86-64, Windows x86-64.",
+        ),
+    ],
+)
+def test_the_command_prints_the_platforms_of_an_fmu(directories: tuple[str, ...], said: str, tmp_path: Path) -> None:
+    with zipfile.ZipFile(tmp_path / "x.fmu", "w") as file:
+        for name in directories:
+            file.writestr(f"binaries/{name}/drive.so", b"")
+    assert importlib.import_module("lostmotion.cli.fmu")._platforms(tmp_path / "x.fmu").startswith(said)

@@ -11,6 +11,19 @@ from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_file
 from .terminal import about, busy
 
+PLATFORMS = {
+    "linux64": "Linux x86-64",
+    "x86_64-linux": "Linux x86-64",
+    "aarch64-linux": "Linux aarch64",
+    "win64": "Windows x86-64",
+    "x86_64-windows": "Windows x86-64",
+    "aarch64-windows": "Windows aarch64",
+    "darwin64": "macOS x86-64",
+    "x86_64-darwin": "macOS x86-64",
+    "aarch64-darwin": "macOS aarch64",
+}
+"""names of the directories of libraries in FMI 2.0 and 3.0"""
+
 
 def fmu(
     scenario: SourceArgument,
@@ -81,6 +94,21 @@ def fmu(
             libraries=libraries,
         )
     print(f"FMU written to {output}")
+    print(_platforms(output))
     for name, key in replaced.items():
         print(f"Input {name} replaces {key} of the scenario as soon as the importer sets it.")
     print(f"Try it with FMPy: fmpy simulate {output} --show-plot")
+
+
+def _platforms(path: Path) -> str:
+    """The line that says where an FMU runs."""
+    from zipfile import ZipFile
+
+    with ZipFile(path) as file:
+        found = {name.split("/")[1] for name in file.namelist() if name.startswith("binaries/")}
+    shown = ", ".join(PLATFORMS.get(name, name) for name in sorted(found))
+    return f"It runs on {shown}" + (
+        "."
+        if len(found) >= len(set(PLATFORMS.values()))
+        else "; `make fmu` adds the others of Linux, Windows and macOS."
+    )

@@ -21,7 +21,6 @@ if TYPE_CHECKING:
     import pyarrow as pa
 
 SLOW_RUNS = 20  # in a piece of those that are made one by one
-AXES = 100  # in a piece of a task, most of which the rules refuse
 MAX_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 
@@ -38,9 +37,7 @@ def pieces(study: Study, first: int, last: int) -> list[tuple[int, int]]:
 
     Most chunks that the core can make are one piece.
     """
-    size = last - first if core_can(study) else SLOW_RUNS
-    if study.axis is not None:
-        size = AXES
+    size = last - first if core_can(study) or study.axis is not None else SLOW_RUNS
     if held := _arrays(study):
         size = min(size, max(1, MAX_NUMBERS // (held * study.scenario.simulation.samples)))
     return [(a, min(a + size, last)) for a in range(first, last, size)]

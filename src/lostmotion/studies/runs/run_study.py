@@ -30,10 +30,9 @@ from .stored_parts import (
     carried,
     checksum_of,
     checksums,
-    chunks,
     damages,
     forget_missing,
-    part_of,
+    parts,
     write_part,
 )
 
@@ -103,12 +102,13 @@ def study(
     for path in damaged:
         path.unlink()
     forget_missing(directory)
-    missing = [(first, last) for first, last in chunks(what.total) if not part_of(directory, first).exists()]
+    files = parts(directory, what)
+    missing = [runs for runs, part in files.items() if not part.exists()]
     done = what.total - sum(last - first for first, last in missing)
     report = _rising(progress or _silent)
     report(done)
     for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor, report, done):
-        write_part(directory, first, content)
+        write_part(files[first, last], content)
         done += last - first
         report(done)
     return directory
@@ -136,7 +136,7 @@ def damages_of(directory: Path, what: Study) -> dict[Path, str]:
     Raises InputError: the note is what is wrong: it is of another study than all parts, which repairing would remove.
     """
     text = to_json(what)
-    damaged = damages(directory, text, what.total)
+    damaged = damages(directory, what, text)
     foreign = [path for path, reason in damaged.items() if reason == FOREIGN]
     if foreign and text not in _studies_carried(directory).values():
         raise InputError(

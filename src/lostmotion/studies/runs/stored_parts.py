@@ -4,14 +4,17 @@ from __future__ import annotations
 
 import hashlib
 import os
-from collections.abc import Iterator, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 
 from ...atomic_writer import unwritable, write_bytes
 from ...errors import InputError
 from ..study.random_designs import CHUNK
+from ..study.study import Study
 
 CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
+
+PAIRS = 40  # of a task in a part: they take a second each, and an interruption loses those of a part that is not whole
 
 STRAY = "is no part of this study"
 FOREIGN = "belongs to another study"
@@ -19,27 +22,23 @@ FOLDER = "is a directory"
 NO_REPAIR = (STRAY, FOLDER)  # what repairing leaves to the user
 
 
-def chunks(total: int) -> Iterator[tuple[int, int]]:
-    """First run of each part, and the run after its last."""
-    return ((first, min(first + CHUNK, total)) for first in range(0, total, CHUNK))
+def parts(directory: Path, what: Study) -> dict[tuple[int, int], Path]:
+    """File of each part, by its first run and the run after its last."""
+    size = CHUNK if what.axis is None else PAIRS
+    runs = ((first, min(first + size, what.total)) for first in range(0, what.total, size))
+    return {one: directory / f"part-{number:06d}.parquet" for number, one in enumerate(runs)}
 
 
-def part_of(directory: Path, first: int) -> Path:
-    """File of the part that begins with a run."""
-    return directory / f"part-{first // CHUNK:06d}.parquet"
-
-
-def write_part(directory: Path, first: int, content: bytes) -> None:
+def write_part(part: Path, content: bytes) -> None:
     """Write a part whole or not at all. Its checksum comes first: a part without one would be made again.
 
     Raises InputError: the part cannot be written.
     """
-    part = part_of(directory, first)
     try:
-        with (directory / CHECKSUMS).open("a", encoding="ascii") as file:
+        with part.with_name(CHECKSUMS).open("a", encoding="ascii") as file:
             file.write(f"{hashlib.sha256(content).hexdigest()}  {part.name}\n")
     except OSError as error:
-        raise unwritable(directory / CHECKSUMS, error) from None
+        raise unwritable(part.with_name(CHECKSUMS), error) from None
     write_bytes(part, content)
 
 
@@ -77,14 +76,13 @@ def carried(metadata: Mapping[bytes, bytes] | None) -> str:
     return (metadata or {}).get(b"lostmotion_study", b"").decode()
 
 
-def damages(directory: Path, text: str, total: int) -> dict[Path, str]:
+def damages(directory: Path, what: Study, text: str) -> dict[Path, str]:
     """Parts that are damaged, or belong elsewhere, each with the reason.
 
     text: the study as JSON.
-    total: number of its runs.
     """
     known = checksums(directory)
-    runs = {part_of(directory, first): (first, last) for first, last in chunks(total)}
+    runs = {part: one for one, part in parts(directory, what).items()}
     found = {}
     for path in sorted(directory.glob("part-*.parquet")):
         reason = _damage(path, *runs[path], text, known.get(path.name)) if path in runs else STRAY
