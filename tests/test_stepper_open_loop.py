@@ -26,7 +26,7 @@ def train(backlash: float = 0.0, friction: float = 0.2, stiffness: float = 2e4, 
 
 
 def test_stiffness_at_rest_is_the_field_and_the_gear_in_series():
-    found = lm.servo.open_loop(train())
+    found = lm.sizing.open_loop(train())
     field = STEPS / 4 * T_H * RATIO**2
     assert found.field_stiffness == pytest.approx(field, rel=1e-12)
     assert found.stiffness == pytest.approx(1.0 / (1.0 / field + 1.0 / 2e4), rel=1e-12)
@@ -35,15 +35,15 @@ def test_stiffness_at_rest_is_the_field_and_the_gear_in_series():
 def test_resonances_are_those_of_two_masses_on_two_springs():
     """Sum and product of the squares: (k_1 + k_2)/J_1 + k_2/J_2 and k_1 k_2/(J_1 J_2)."""
     k_1, k_2, J_1, J_2 = STEPS / 4 * T_H * RATIO**2, 2e4, J * RATIO**2, 0.01
-    squares = [(2.0 * math.pi * f) ** 2 for f in lm.servo.open_loop(train()).resonances]
+    squares = [(2.0 * math.pi * f) ** 2 for f in lm.sizing.open_loop(train()).resonances]
     assert sum(squares) == pytest.approx((k_1 + k_2) / J_1 + k_2 / J_2, rel=1e-9)
     assert math.prod(squares) == pytest.approx(k_1 * k_2 / (J_1 * J_2), rel=1e-9)
 
 
 def test_the_reversal_error_is_the_backlash_and_what_friction_bends():
     """Coming to rest slowly the load stays behind by its backlash and up to 2 T_f/k of both springs."""
-    plain, wide = (lm.servo.open_loop(train(backlash)).reversal for backlash in (0.0, 5.0 * ARCMIN))
-    bent = 2.0 * 0.2 / lm.servo.open_loop(train()).stiffness
+    plain, wide = (lm.sizing.open_loop(train(backlash)).reversal for backlash in (0.0, 5.0 * ARCMIN))
+    bent = 2.0 * 0.2 / lm.sizing.open_loop(train()).stiffness
     microstep = 2.0 * math.pi / STEPS / 64 / RATIO
     assert 0.0 < plain < bent + microstep
     assert wide - 5.0 * ARCMIN == pytest.approx(0.5 * bent, abs=0.5 * bent + microstep)
@@ -52,7 +52,7 @@ def test_the_reversal_error_is_the_backlash_and_what_friction_bends():
 def test_a_load_that_rings_settles_when_its_envelope_enters_the_window():
     """Without friction at the load the lower mode dies as exp(-b w_1^2 ...): the report names the instant from which on samples stay inside."""
     scenario, window = train(friction=0.0, stiffness=500.0).replace(**{"gears.g.mesh_damping": 0.05}), 0.3 * ARCMIN
-    found = lm.servo.open_loop(scenario, window=window)
+    found = lm.sizing.open_loop(scenario, window=window)
     result = lm.simulate(scenario)
     reference = scenario.tables.command["m"].stepping.reference
     _, end = reference.intervals()[0]
@@ -81,11 +81,11 @@ def test_the_short_form_and_an_axis_have_the_same_report():
         command={"stepping": {"microsteps": 64, "reference": MOVES}},
         simulation={"duration": 2.2, "sample_interval": 1e-3},
     )
-    one, other = lm.servo.open_loop(short), lm.servo.open_loop(train())
+    one, other = lm.sizing.open_loop(short), lm.sizing.open_loop(train())
     assert one.resonances == pytest.approx(other.resonances, rel=1e-9)
     assert one.settling == pytest.approx(other.settling, abs=2e-3)
     assert one.reversal == pytest.approx(other.reversal, rel=1e-3)
-    axis = lm.servo.open_loop(lm.load("stepper-belt-axis"))
+    axis = lm.sizing.open_loop(lm.load("stepper-belt-axis"))
     assert axis.unit == "m"
     radius = 0.04 / (2.0 * math.pi)
     field = 50 * 0.44 / radius**2
@@ -94,9 +94,9 @@ def test_the_short_form_and_an_axis_have_the_same_report():
 
 def test_lost_steps_and_moves_that_do_not_settle_do_not_fit():
     lost = lm.load("stepper-belt-axis", {"command.stepping.travel.acceleration": "150 m/s^2", "command.stepping.travel.speed": "0.8 m/s"})
-    assert lm.servo.open_loop(lost).verdict.state == "does not fit"
-    assert lm.servo.open_loop(train(), window=1e-9).verdict.state == "does not fit"
-    assert lm.servo.open_loop(train(), window=1e-2).verdict.state == "fits"
+    assert lm.sizing.open_loop(lost).verdict.state == "does not fit"
+    assert lm.sizing.open_loop(train(), window=1e-9).verdict.state == "does not fit"
+    assert lm.sizing.open_loop(train(), window=1e-2).verdict.state == "fits"
 
 
 @pytest.mark.parametrize("option", [["--tune", "margins"], ["--drive-units"], ["-o", "sheet"]])
@@ -115,4 +115,4 @@ def test_the_command_prints_the_report():
 
 def test_a_scenario_without_a_stepper_is_refused():
     with pytest.raises(lm.InputError, match="no stepper that follows a reference"):
-        lm.servo.open_loop(lm.load("position-axis"))
+        lm.sizing.open_loop(lm.load("position-axis"))

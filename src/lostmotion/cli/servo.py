@@ -194,8 +194,8 @@ def _open_loop(
 ) -> None:
     """Print what can be said of the axis of a stepper, which has no loop."""
     from ..errors import InputError
-    from ..servo.open_loop import NO_LOOP, open_loop
     from ..simulation.runs.pointing_error import pointed
+    from ..sizing.stepper_axis import NO_LOOP, open_loop
     from ..units.conversion import si_value
 
     if given := [option for option, value in asked.items() if value is not None]:

@@ -14,8 +14,6 @@ from .hunting.hunting import limit_cycle as limit_cycle
 from .margins import Bandwidth as Bandwidth
 from .margins import Instability as Instability
 from .margins import Margins as Margins
-from .open_loop import OpenLoop as OpenLoop
-from .open_loop import open_loop as open_loop
 from .regimes import Axis as Axis
 from .settling import Moves as Moves
 from .settling import Settling as Settling

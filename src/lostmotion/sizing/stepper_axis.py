@@ -17,9 +17,9 @@ from ..simulation.runs.lost_steps import LostSteps, found_in
 from ..simulation.runs.pointing_error import pointed, pointing_errors, pointing_names
 from ..simulation.runs.run import run
 from ..simulation.scenario.scenario import Scenario
-from ..sizing.one_axis import OneAxis
 from ..units.practical import practical
 from ..verdict import Point, Verdict
+from .one_axis import OneAxis
 
 MICROSTEPS_OF_WINDOW = 4.0  # at the load, in the window by default
 NO_LOOP = "a stepper is turned without a loop, so it has no margins and nothing to tune; of its motion see the open-loop report"
@@ -103,7 +103,7 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: float | N
     Examples
     --------
     >>> import lostmotion as lm
-    >>> found = lm.servo.open_loop(lm.load("stepper-belt-axis"))
+    >>> found = lm.sizing.open_loop(lm.load("stepper-belt-axis"))
     >>> [f"{f:.1f} Hz" for f in found.resonances]
     ['65.2 Hz', '350.7 Hz']
     """
