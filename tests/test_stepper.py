@@ -384,8 +384,9 @@ def test_a_batch_of_steppers_makes_the_steps_of_each_alone() -> None:
 def test_the_live_page_draws_the_electrical_angle() -> None:
     from lostmotion.live_page.description import describe
 
-    figures = describe(lm.load("stepper-belt-axis"), "belt")["figures"]
-    assert [f["series"][0]["variable"] for f in figures] == ["motor_command", "motor_electrical_angle"]
+    page = describe(lm.load("stepper-belt-axis"), "belt")
+    assert [f["series"][0]["variable"] for f in page["figures"]] == ["motor_command", "motor_electrical_angle"]
+    assert not [s for s in page["sliders"] if s["key"].startswith("command")]  # which would take the steps away
 
 
 def test_step_by_step_the_field_and_the_current_are_named() -> None:

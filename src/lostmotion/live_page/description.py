@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..control.command import FieldAngle
 from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
 from ..portable.descriptions import described
@@ -137,7 +138,7 @@ def _signal_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
     shafts = {keys[name]: shaft for name, shaft in loads.items() if name in keys}
     duration = scenario.simulation.duration
     for number, (key, signal) in enumerate(_inputs(scenario)):
-        if not key or key in turned:
+        if not key or key in turned or isinstance(signal, FieldAngle):  # whose steps a slider would take away
             continue
         if key.startswith("command"):
             _, _, name = key.partition(".")
