@@ -54,7 +54,9 @@ FORMS: dict[str, dict[str, Any]] = {
 }
 
 
-def found(form: str, directory: Path, **measured: Any) -> lm.identification.IdentificationResult:
+def found(
+    form: str, directory: Path, more: tuple[dict[str, str], dict[str, Any]] = ({}, {}), **measured: Any
+) -> lm.identification.IdentificationResult:
     f = FORMS[form]
     (directory / "rig.toml").write_text(toml_text({**f["rig"], "simulation": TIMES}))
     time = np.arange(400) / 200.0
@@ -71,8 +73,8 @@ def found(form: str, directory: Path, **measured: Any) -> lm.identification.Iden
         "scenario": "rig.toml",
         "inputs": {f["input"]: {"channel": "torque", "interpolation": "hold"}},
         "measured": {"position": channel},
-        "set": dict(zip(f["keys"], ("coulomb", "viscous"), strict=True)),
-        "parameters": {"coulomb": {"start": 0.5 * COULOMB / f["per_turn"]}, "viscous": {"start": 1e-3 / f["per_turn"] ** 2}},
+        "set": dict(zip(f["keys"], ("coulomb", "viscous"), strict=True)) | more[0],
+        "parameters": {"coulomb": {"start": 0.5 * COULOMB / f["per_turn"]}, "viscous": {"start": 1e-3 / f["per_turn"] ** 2}, **more[1]},
     }
     (directory / "identify.toml").write_text(toml_text(task))
     return lm.identify(directory / "identify.toml")
@@ -91,3 +93,12 @@ def test_a_deviation_is_one_of_its_variable(deviation: Any, tmp_path: Path) -> N
     with pytest.raises(lm.InputError) as refused:
         found("axis", tmp_path, deviation=deviation)
     assert refused.value.problems[0].keys == ("measured.position.deviation",)
+
+
+def test_inertias_before_and_behind_a_rigid_gear_are_told_apart_by_no_log(tmp_path: Path) -> None:
+    """Whatever the acceleration: only J_M + J_L/i^2 acts, so that the remedy is a data sheet."""
+    rotor, load = {"start": INERTIA - 1e-4, "max": 0.01}, {"start": 0.01, "max": 1.0}
+    keys = {"motor.rotor_inertia": "rotor", "load.inertia": "load"}
+    result = found("short", tmp_path, more=(keys, {"rotor": rotor, "load": load}))
+    [left] = [u for u in result.rungs[result.chosen].undetermined if {"rotor", "load"} <= u.changes.keys()]
+    assert "data sheet" in left.text and "acceleration" not in left.text

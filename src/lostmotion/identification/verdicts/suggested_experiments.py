@@ -30,6 +30,9 @@ def remedy_for(rig: Rig, names: Sequence[str]) -> str:
         return f"give a log with steps of the {'reference' if _has_reference(rig) else 'command'}"
     if enter("breakaway_torque", "breakaway_force", "stribeck_speed", "friction_curve"):
         return "give slow reversals, and a log that creeps from rest"
+    inertias = [any(part in key for key in own for part in ("inertia", "mass")) for own in keys]
+    if len(names) > 1 and all(inertias):
+        return "give one of them by its data sheet: inertias that are rigidly joined show as a sum alone"
     if enter("rotor_inertia", "inertia", "mass"):
         known = "" if torque else " and a known torque"
         return f"give a log with high acceleration{known}, or the inertia of the data sheet"
