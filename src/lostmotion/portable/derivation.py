@@ -22,7 +22,8 @@ Numbers = Callable[[Scenario], np.ndarray]
 
 # Not of the motion: when it is read, and what was asked of the drive.
 _OTHERS = ("simulation", "task", "title")
-_OF_TARGETS = re.compile(r"(^|\.)reference\.target\.")  # their paths are series of arrays, which record nothing
+# Of paths of targets and of instants of steps, which are found in arrays, and so record nothing.
+_IN_ARRAYS = re.compile(r"(^|\.)(reference\.target|stepping\.(reference|travel))\.")
 FROM_ZERO = 0.25  # what a value of 0 is changed to, to see whether it may be another alone
 
 
@@ -72,7 +73,7 @@ def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str],
     values = {
         key: value
         for key, value in values_of(scenario.written)
-        if not (CHANGES_OTHERS.fullmatch(key) or _OF_TARGETS.search(key) or (without and without(key)))
+        if not (CHANGES_OTHERS.fullmatch(key) or _IN_ARRAYS.search(key) or (without and without(key)))
         and unit_for(scenario, key) is not None
         and (value or _free(scenario, key))
     }
