@@ -159,7 +159,8 @@ def _motor_torque(
     if name in scenario.controllers:
         raise InputError(f"{scenario.motor_key(name)} is under its controller, and no channel shows its torque")
     if motor.kind != "torque_source":
-        raise InputError(f"motors.{name} has a voltage as its command, and no channel shows its torque")
+        what = "the angle of its field" if motor.kind == "stepper" else "a voltage"
+        raise InputError(f"motors.{name} has {what} as its command, and no channel shows its torque")
     torque = motor.rated_torque * _acting(rig, s, known, scenario, f"{name}_command")
     limit = np.inf if motor.torque_limit is None else motor.torque_limit
     return np.asarray(np.clip(torque, -limit, limit))
