@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
-from lostmotion.pointing.budget import View, first_gap
+from lostmotion.pointing.budget import PointingError, View, first_gap
 from lostmotion.reports.pointing import verdict_of
 
 ROOT = Path(__file__).parent.parent
@@ -212,11 +212,33 @@ def test_two_axes_in_one_scenario_are_those_of_two() -> None:
     [(1.0, "fits", "all the time"), (0.97, "does not fit", "for 3 % of"), (1.0 - 2e-5, "does not fit", "for 0.002 % of")],
 )
 def test_a_target_that_leaves_the_view_does_not_fit(share: float, state: str, said: str) -> None:
-    found = verdict_of(SimpleNamespace(lost=(), view=View(share, 0.5)))  # type: ignore[arg-type]
+    found = verdict_of(SimpleNamespace(lost=(), limits={}, view=View(share, 0.5)))  # type: ignore[arg-type]
     assert found is not None
     assert found.state == state
     assert said in found.lines[0]
-    assert verdict_of(SimpleNamespace(lost=(), view=None)) is None  # type: ignore[arg-type]
+    assert verdict_of(SimpleNamespace(lost=(), limits={}, view=None)) is None  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize(
+    ("peak", "state", "said"),
+    [
+        (6.0e-3, "does not fit", "peak error 6 mrad, 20 % above its limit of 5 mrad"),
+        (5.0e-3 * (1.0 + 1e-12), "fits", "peak error 5 mrad, within its limit of 5 mrad"),  # converted from another unit
+        (4.0e-3, "fits", "peak error 4 mrad, within its limit of 5 mrad"),
+    ],
+)
+def test_the_peak_of_an_axis_is_compared_with_its_limit(peak: float, state: str, said: str) -> None:
+    whole = {"motor": PointingError(rms=1e-3, peak=peak, mean=0.0, probable=1e-3, measured_rms=0.0)}
+    budget = SimpleNamespace(lost=(), limits={"motor": 5e-3}, view=None, whole=whole, units={"motor": "rad"})
+    found = verdict_of(budget)  # type: ignore[arg-type]
+    assert found is not None and found.state == state
+    assert said in found.lines[0]
+
+
+@pytest.mark.parametrize("limit", [{"engine": 1.0}, {"motor": 0.0}, {"motor": "1 N*m"}])
+def test_a_limit_of_no_axis_or_of_no_angle_is_refused(limit: dict[str, float | str]) -> None:
+    with pytest.raises(lm.InputError, match="limit"):
+        lm.pointing_budget(lm.load("tracking-loss-map", {"simulation.duration": 1.0}), limit=limit, robustness=False)
 
 
 def test_the_command_writes_its_sheet(tmp_path: Path) -> None:
