@@ -229,7 +229,7 @@ def test_a_target_that_leaves_the_view_does_not_fit(share: float, state: str, sa
 )
 def test_the_peak_of_an_axis_is_compared_with_its_limit(peak: float, state: str, said: str) -> None:
     whole = {"motor": PointingError(rms=1e-3, peak=peak, mean=0.0, probable=1e-3, measured_rms=0.0)}
-    budget = SimpleNamespace(lost=(), limits={"motor": 5e-3}, view=None, whole=whole, units={"motor": "rad"})
+    budget = SimpleNamespace(lost=(), orders={}, limits={"motor": 5e-3}, view=None, whole=whole, units={"motor": "rad"})
     found = verdict_of(budget)  # type: ignore[arg-type]
     assert found is not None and found.state == state
     assert said in found.lines[0]
