@@ -93,7 +93,7 @@ def run(
         raise InputError(
             f"--explain {explain}: must lie between 0 and simulation.duration, {loaded.simulation.duration} s"
         )
-    _check_solver(solver, tolerance)
+    _check_solver(loaded, solver, tolerance)
     with about(scenario):
         result = _simulated(loaded, solver, tolerance)
     from ..reports.run import summary, verdict_of
@@ -136,11 +136,9 @@ def _simulated(loaded: Scenario, solver: str | None, tolerance: float | None) ->
     from ..errors import InputError
     from ..simulation.runs.run import TOLERANCE
     from ..simulation.runs.run import run as work
-    from ..simulation.scenario.requirements import wound
 
     try:
-        adaptive = solver == "dormand-prince" or (solver is None and any(wound(loaded)))
-        with simulating("Simulating", loaded, (tolerance or TOLERANCE) if adaptive else 0.0):
+        with simulating("Simulating", loaded, (tolerance or TOLERANCE) if _is_adaptive(loaded, solver) else 0.0):
             return work(loaded, solver=solver, relative_tolerance=tolerance)  # type: ignore[arg-type]
     except SolverError as error:
         from ..reports.run_loops import unstable_loops
@@ -194,13 +192,20 @@ def _check_figure(figure: str | None, plot: Path | None) -> None:
             raise InputError(f"--figure {figure}: is not known; take one of {', '.join(FIGURES)}")
 
 
-def _check_solver(solver: str | None, tolerance: float | None) -> None:
+def _is_adaptive(loaded: Scenario, solver: str | None) -> bool:
+    """Whether the run is one of dormand-prince, which a stepper with a winding takes by itself."""
+    from ..simulation.scenario.requirements import wound
+
+    return solver == "dormand-prince" or (solver is None and any(wound(loaded)))
+
+
+def _check_solver(loaded: Scenario, solver: str | None, tolerance: float | None) -> None:
     from ..errors import InputError
     from ..simulation.runs.run import TOLERANCES
 
     if solver not in (None, "exact", "dormand-prince"):
         raise InputError(f"--solver {solver}: must be exact or dormand-prince")
-    if tolerance is not None and solver == "exact":
+    if tolerance is not None and not _is_adaptive(loaded, solver):
         raise InputError(
             f"--tolerance {tolerance:g}: the exact solver has none; leave it out, or add --solver dormand-prince"
         )

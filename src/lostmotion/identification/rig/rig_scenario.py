@@ -131,9 +131,9 @@ class Rig:
         """Standard deviation of the errors of a measured channel [SI]; None: the task gives none."""
         key = f"measured.{name}.deviation"
         try:
-            found = in_unit(channel.deviation, self.units[channel.variable], key)
+            found = in_unit(channel.deviation, self.units[channel.variable])
         except ValueError as problem:
-            raise InputError(str(problem).removeprefix(f"has {key} = "), key) from None
+            raise InputError(str(problem), key) from None
         if found is not None and not 0.0 < found < math.inf:
             raise InputError(f"{found:g} must be above 0", key)
         return found

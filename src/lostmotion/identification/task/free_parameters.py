@@ -10,16 +10,17 @@ from ...inputs.quantities import Number
 from ...units.conversion import si_factor, si_value
 
 
-def in_unit(value: Any, unit: str, key: str) -> float | None:
-    """A number in SI, or text with a unit of the kind of `unit`, in SI. Raises ValueError."""
+def in_unit(value: Any, unit: str, key: str = "") -> float | None:
+    """A number in SI, or text with a unit of the kind of `unit`, in SI. Raises ValueError, which names the key if there is one."""
+    given = f"has {key} = {value!r}" if key else repr(value)
     if value is None or (isinstance(value, int | float) and not isinstance(value, bool)):
         return None if value is None else float(value)
     if not isinstance(value, str):
-        raise ValueError(f"has {key} = {value!r}; give a number in SI, or text with a unit")
+        raise ValueError(f"{given}; give a number in SI, or text with a unit")
     try:
         return si_value(value, unit) * si_factor(unit)
     except ValueError as problem:
-        raise ValueError(f"has {key} = {value!r}, which {problem}") from None
+        raise ValueError(f"{given}, which {problem}") from None
 
 
 class FreeParameter(Part):
