@@ -277,3 +277,26 @@ def test_shipped_examples_of_tasks_are_as_before():
     """A task without steppers among its candidates has none of their tables."""
     study = lm.studies.load_task(ROOT / "examples" / "select-axis.toml")
     assert study.axis.steppers == {}
+
+
+@pytest.mark.parametrize(("base", "key"), [("stepper-belt-axis", "motor_pointing_error"), ("stepper-short", "pointing_error")])
+def test_a_study_over_steppers_has_their_pointing_error(base: str, key: str, tmp_path: Path):
+    """Each row is a run of its own, with the error that the run has."""
+    if base == "stepper-short":
+        (tmp_path / "stepper-short.toml").write_text(FORMS["short"] + '\n[simulation]\nduration = "0.5 s"\nsample_interval = "1 ms"\n')
+        base, vary = "stepper-short.toml", ("load.inertia", [1e-4, 2e-4])
+    else:
+        vary = ("axis.slide.mass", [0.4, 0.6])
+    values = f'[[vary]]\nkey = "{vary[0]}"\nvalues = {vary[1]}\n'
+    (tmp_path / "study.toml").write_text(f'title = "s"\nbase = "{base}"\n{values}[keep]\nworst = "peak({key})"\n')
+    rows = lm.study(lm.studies.load_study(tmp_path / "study.toml"), tmp_path / "rows")
+    from lostmotion.simulation.runs.pointing_error import pointing_errors
+    from lostmotion.simulation.runs.run import run
+    from lostmotion.studies.runs.read_table import read_table
+
+    table = read_table(rows)
+    start = tmp_path / base if base.endswith(".toml") else base
+    for value, worst in zip(vary[1], table["worst"].to_pylist(), strict=True):
+        scenario = lm.load(start, {vary[0]: value})
+        (error,) = pointing_errors(scenario, run(scenario, energy=False)).values()
+        assert worst == pytest.approx(float(abs(error).max()), rel=1e-9)

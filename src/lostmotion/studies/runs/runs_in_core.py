@@ -11,6 +11,7 @@ from ...errors import InputError
 from ...model.torsion import Rigid
 from ...simulation.forms.dotted_keys import renamed
 from ...simulation.runs.core_runs import core_case
+from ...simulation.runs.pointing_error import pointed
 from ...simulation.runs.separate_trains import parts_of
 from ...simulation.scenario.one_gear import drive_keys, is_drive
 from ...simulation.scenario.scenario import Scenario
@@ -31,7 +32,8 @@ def _fields() -> dict[str, int]:
 
 def together(study: Study) -> bool:
     """Whether its runs are of trains that the core can take at once."""
-    return not study.scenario.axes() and len(parts_of(study.scenario)) == 1
+    follows = study.scenario.axes() or pointed(study.scenario)
+    return not follows and len(parts_of(study.scenario)) == 1
 
 
 def core_can(study: Study) -> bool:
