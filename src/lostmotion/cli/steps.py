@@ -45,7 +45,7 @@ def steps(
     """
     from ..atomic_writer import write_whole
     from ..reports.stepper_curves import as_csv, charts, table
-    from ..sizing.stepper_curves import stepper_curves
+    from ..sizing.pull_out_curves import stepper_curves
 
     for path, endings in ((output, (".csv",)), (plot, PICTURES)):
         if path is not None and path.suffix not in endings:

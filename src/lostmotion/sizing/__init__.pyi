@@ -7,7 +7,7 @@ from .finding import Finding as Finding
 from .finding import Findings as Findings
 from .motor_run import motor_current as motor_current
 from .motor_run import temperatures as temperatures
+from .pull_out_curves import stepper_curves as stepper_curves
 from .stepper_axis import OpenLoop as OpenLoop
 from .stepper_axis import open_loop as open_loop
-from .stepper_curves import stepper_curves as stepper_curves
 from .warming import warm_up as warm_up

@@ -13,6 +13,7 @@ from ..model.linear import RatedScrew
 from ..model.losses import LossMap
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
+from ..simulation.scenario.one_axis import OneAxis
 from ..simulation.scenario.requirements import need_no_impacts
 from ..simulation.scenario.scenario import Scenario
 from .axis_rules import HOUR, AxialLoad, belt_rules, missing, rack_rules, screw_life, screw_rules
@@ -22,8 +23,8 @@ from .gearbox_check import input_speeds, loads, locks, loss_map
 from .motion_check import resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
-from .one_axis import OneAxis, axis_rules
 from .power_off import holdings
+from .rules_of_one_axis import axis_rules
 from .stepper_check import speed_of_stepper, stepper_rules
 from .supply import amplifier_of_a_run, bus_findings, power_in_run
 

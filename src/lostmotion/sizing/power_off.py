@@ -14,7 +14,7 @@ from ..test_rig.virtual_rig import TestRig
 from .axis_rules import BRAKE, SLIDE_BRAKE, against, brake_of_a_run, held_by
 from .finding import Finding
 from .holding import holding
-from .one_axis import depends_on_angles, not_judged
+from .rules_of_one_axis import depends_on_angles, not_judged
 
 HOLDING = "holding with command 0"
 

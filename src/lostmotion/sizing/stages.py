@@ -11,10 +11,11 @@ import numpy as np
 from ..data_sheets.linear_components import linear_table
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
+from ..model.gears_in_series import in_series
 from ..model.linear import LinearDrive, RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
 from ..model.rack_and_belt import RatedBelt, RatedRack
-from ..model.torsion import Hysteresis, LinearStiffness, Rigid, TorsionCurve
+from ..model.torsion import Hysteresis, Rigid
 from .required_motion import RequiredMotion
 
 SAME = 1e-9  # relative, within which two breaks of a curve are one
@@ -64,17 +65,6 @@ def at_input(motion: RequiredMotion, stage: LinearDrive) -> RequiredMotion:
         motion.inertia / ratio**2 + own.inertia,
         motion.holding / ratio,
     )
-
-
-DIRECT = Gearbox(
-    ratio=1.0,
-    rated_input_speed=1.0,
-    rated_output_torque=1e3,
-    stiffness=Rigid(),
-    losses=ConstantEfficiency(efficiency=1.0),
-    note="no gearbox",
-)
-"""stands for a gearbox if the motor drives the stage directly; no rule judges it"""
 
 
 def together(g: Gearbox, stage: LinearDrive) -> Gearbox:
@@ -150,41 +140,3 @@ def _beyond(x: float, loads: list[float], values: list[list[float]]) -> list[flo
     a, b = (0, 1) if x < loads[0] else (-2, -1)
     share = (x - loads[a]) / (loads[b] - loads[a])
     return [p + share * (q - p) for p, q in zip(values[a], values[b], strict=True)]
-
-
-def in_series(g: Gearbox, own: Any, ratio: float) -> TorsionCurve | LinearStiffness | Rigid:
-    """Force over deflection at the slide: the deflections of both at the same force add up."""
-    curves = [
-        [(b / scale, k * scale**2) for b, k in zip([*breaks, math.inf], slopes, strict=True)]
-        for curve, scale in ((g.stiffness, ratio), (own, 1.0))
-        if not isinstance(curve, Rigid)
-        for breaks, slopes in [curve.pieces()]
-    ]
-    if not curves:
-        return Rigid()
-    gap = 0.0
-    segments: list[list[tuple[float, float]]] = []  # of each curve: (force up to which it holds, slope)
-    for curve in curves:
-        force, previous = 0.0, 0.0
-        found: list[tuple[float, float]] = []
-        for end, slope in curve:
-            if slope == 0.0 and not found:
-                gap += end
-                previous = end
-                continue
-            force += slope * (end - previous)
-            found.append((force, slope))
-            previous = end
-        segments.append(found)
-    ends = sorted({force for found in segments for force, _ in found})
-    slopes, breaks, before, deflection = [], [], 0.0, 0.0
-    for end in ends:
-        compliance = sum(1.0 / next(k for force, k in found if force >= end) for found in segments)
-        slopes.append(1.0 / compliance)
-        if math.isfinite(end):
-            deflection += (end - before) * compliance
-            breaks.append(deflection)
-            before = end
-    if len(slopes) == 1 and gap == 0.0:
-        return LinearStiffness(stiffness=slopes[0])
-    return TorsionCurve(slopes=tuple(slopes), breaks=tuple(breaks), backlash=2.0 * gap)

@@ -16,10 +16,10 @@ from ..model.torsion import Rigid
 from ..simulation.runs.lost_steps import LostSteps, found_in
 from ..simulation.runs.pointing_error import pointed, pointing_errors, pointing_names
 from ..simulation.runs.run import run
+from ..simulation.scenario.one_axis import OneAxis
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import practical
 from ..verdict import Point, Verdict
-from .one_axis import OneAxis
 
 MICROSTEPS_OF_WINDOW = 4.0  # at the load, in the window by default
 NO_LOOP = "a stepper is turned without a loop, so it has no margins and nothing to tune; of its motion see the open-loop report"

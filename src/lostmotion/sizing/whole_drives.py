@@ -12,10 +12,10 @@ from ..data_sheets.linear_sheets import FORCE_SOURCE, LinearMotorSheet
 from ..data_sheets.records import find
 from ..inputs.quantities import Length, Positive
 from ..model.gearbox import Gearbox
+from ..model.gears_in_series import DIRECT
 from ..model.linear_motor import LinearMotorData
 from ..model.motor import Motor, MotorLimits
 from ..model.synchronous_motor import Winding
-from .stages import DIRECT
 
 LINEAR = ("linear_motor",)  # kinds of records that move a slide themselves
 WHOLE = (*LINEAR, "actuator")  # kinds of records that need no gearbox and no stage

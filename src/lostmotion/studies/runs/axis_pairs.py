@@ -12,6 +12,7 @@ import numpy as np
 from ...data_sheets.linear_sheets import LinearMotorSheet
 from ...errors import InputError, Problem
 from ...model.gearbox import Gearbox
+from ...model.gears_in_series import DIRECT
 from ...model.linear import RatedScrew
 from ...model.motor import Motor
 from ...servo.margins import unstable_pole
@@ -48,7 +49,7 @@ from ...sizing.required_motion import (
     input_demand,
     required_motion,
 )
-from ...sizing.stages import DIRECT, Stage, at_input, together
+from ...sizing.stages import Stage, at_input, together
 from ...sizing.stepper_check import speed_of_stepper, stepper_rules
 from ...sizing.supply import amperes, amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ...worker_threads import thread_pool

@@ -16,6 +16,7 @@ from ...inputs.schema import follow, unit_in_schema
 from ...inputs.toml_files import read_toml
 from ...inputs.validation import shown, unknown_key
 from ...model.angle_torques import STANDARD_GRAVITY
+from ...model.gears_in_series import DIRECT
 from ...model.signals import ForceSignal, TorqueSignal
 from ...model.slide import Slide
 from ...model.task import Task
@@ -25,7 +26,7 @@ from ...simulation.forms.train_tables import train_schema
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import read_series_files, units_of_series
 from ...sizing.axis_task.axis_task import AxisTask, InnerLoop, reference_of
-from ...sizing.stages import DIRECT, STAGES, stage_of
+from ...sizing.stages import STAGES, stage_of
 from ...sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from ..study.records_that_vary import kind_of_record, names_that_fit
 from ..study.select_table import Selection
