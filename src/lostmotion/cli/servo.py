@@ -143,8 +143,8 @@ def servo(
     from ..simulation.runs.pointing_error import pointed
 
     if not loaded.axes() and pointed(loaded):
-        asked = {"--tune": rule, "--drive-units": drive_units or None, "-o": output or None}
-        _open_loop(loaded, scenario, motor, window, asked)
+        options_of_loops = {"--tune": rule, "--drive-units": drive_units or None, "-o": output or None}
+        _open_loop(loaded, scenario, motor, window, options_of_loops)
         return
     from ..servo.commission import commission, work
 
