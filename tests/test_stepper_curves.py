@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.sizing.stepper_curves import _Axis
+from lostmotion.sizing.pull_out_curves import _Axis
 
 J, T_H, N = 5e-6, 0.3, 50
 STEP = 2.0 * math.pi / (4 * N)
