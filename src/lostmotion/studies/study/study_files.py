@@ -85,11 +85,11 @@ def from_json(text: str) -> Study:
     data = json.loads(text)
     base = data["scenario"]
     scenario = Scenario(**base)
-    data["scenario"] = Scenario.of(scenario.tables, AXIS, checked=False) if data.pop("axis", False) else scenario
+    data["scenario"] = Scenario.of(scenario.tables, AXIS, checked=False) if data.pop("in_axis_form", False) else scenario
     return Study(**data)
 
 
 def to_json(study: Study) -> str:
     """All of a study, the base scenario included."""
     text = study.model_dump_json(exclude_none=True)
-    return f'{text.removesuffix("}")},"axis":true}}' if study.scenario.form == AXIS else text
+    return f'{text.removesuffix("}")},"in_axis_form":true}}' if study.scenario.form == AXIS else text
