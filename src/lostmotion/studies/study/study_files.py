@@ -85,7 +85,9 @@ def from_json(text: str) -> Study:
     data = json.loads(text)
     base = data["scenario"]
     scenario = Scenario(**base)
-    data["scenario"] = Scenario.of(scenario.tables, AXIS, checked=False) if data.pop("in_axis_form", False) else scenario
+    data["scenario"] = (
+        Scenario.of(scenario.tables, AXIS, checked=False) if data.pop("in_axis_form", False) else scenario
+    )
     return Study(**data)
 
 
