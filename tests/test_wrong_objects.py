@@ -55,6 +55,16 @@ STEPPER = lm.Motor(
     inductance_phase=2.8e-3,
     supply_voltage=24.0,
 )
+ROTOR = lm.Scenario(
+    shafts={"motor": {"inertia": 0.0}},
+    motors={
+        "m": {
+            "shaft": "motor",
+            **STEPPER.model_dump(exclude_none=True, include={"kind", "steps_per_revolution", "holding_torque", "rotor_inertia"}),
+        }
+    },
+    simulation={"duration": 1.0, "sample_interval": 0.01},
+)
 THERMAL = {"winding_case": 1.0, "case_ambient": 2.0}
 HEATED = SCENARIO.replace(
     **{f"motor.limits.thermal_resistance_{key}": value for key, value in THERMAL.items()},
@@ -99,6 +109,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "motor": (lm.motor, {"name": "paper-motor", "voltage_limit": None}),
     "motor_current": (lm.sizing.motor_current, {"result": HEAT, "motor": None}),
     "pull_out_torque": (lm.sizing.pull_out_torque, {"motor": STEPPER, "speed": 10.0}),
+    "stepper_curves": (lm.sizing.stepper_curves, {"scenario": ROTOR, "step_rates": [9000.0], "motor": None}),
     "overrunning": (lm.sizing.overrunning, {"gear": SCENARIO.gearbox, "load_torque": 10.0, "input_speed": 100.0}),
     "self_locking": (lm.sizing.self_locking, {"train": SCENARIO.drive().train(), "gear": "gearbox", "load_torque": 10.0, "input_speed": 100.0}),
     "open_result": (lm.open_result, {"path": "none.csv"}),
