@@ -57,7 +57,7 @@ def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = N
     scenario : Scenario
         Its command is replaced but for the steps of the driver.
     step_rates : array_like
-        Full steps a second [Hz].
+        Full steps a second [Hz], 10 to 1e6.
     motor : str, optional
         Name of the stepper. Default: the only one.
 
@@ -113,12 +113,20 @@ def _stepper(scenario: Scenario, motor: str | None) -> str:
 
 def _rates(step_rates: Any) -> np.ndarray:
     try:
+        if np.iscomplexobj(step_rates):
+            raise TypeError
         rates = np.atleast_1d(np.asarray(step_rates, float))
     except (TypeError, ValueError):
         raise InputError(f"step_rates: {shown(step_rates)} must be numbers [Hz]") from None
-    if rates.ndim != 1 or rates.size == 0 or not np.all(np.isfinite(rates) & (rates > 0.0)):
-        raise InputError(f"step_rates: {shown(step_rates)} must be positive and finite [Hz]")
+    low, high = RATES
+    if rates.ndim != 1 or rates.size == 0 or not np.all((rates >= low) & (rates <= high)):
+        raise InputError(
+            f"step_rates: {shown(step_rates)} must lie between {low:g} and {high:g} Hz; below that a stepper gives its holding torque"
+        )
     return rates
+
+
+RATES = 10.0, 1e6  # [Hz], of full steps
 
 
 @dataclass(frozen=True)
