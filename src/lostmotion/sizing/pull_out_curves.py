@@ -116,7 +116,7 @@ def _rates(step_rates: Any) -> np.ndarray:
         if np.iscomplexobj(step_rates):
             raise TypeError
         rates = np.atleast_1d(np.asarray(step_rates, float))
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         raise InputError(f"step_rates: {shown(step_rates)} must be numbers [Hz]") from None
     low, high = RATES
     if rates.ndim != 1 or rates.size == 0 or not np.all((rates >= low) & (rates <= high)):

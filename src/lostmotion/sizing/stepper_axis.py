@@ -11,6 +11,7 @@ from ..control.references import MovesReference
 from ..control.turning import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
+from ..inputs.quantities import Number
 from ..inputs.validation import did_you_mean, shown
 from ..model.torsion import Rigid
 from ..simulation.runs.lost_steps import LostSteps, found_in
@@ -78,7 +79,7 @@ class OpenLoop:
 
 
 @checked
-def open_loop(scenario: Scenario, *, motor: str | None = None, window: float | None = None) -> OpenLoop:
+def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | None = None) -> OpenLoop:
     """Report on the axis of a stepper, which has no loop.
 
     Parameters
@@ -107,6 +108,8 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: float | N
     >>> [f"{f:.1f} Hz" for f in found.resonances]
     ['65.2 Hz', '350.7 Hz']
     """
+    if window is not None and not 0.0 < window < math.inf:
+        raise InputError(f"window: {window:g} must be above 0")
     axes = [name for name in pointed(scenario) if scenario.train().motors[name].kind == "stepper"]
     if not axes:
         raise InputError("the scenario has no stepper that follows a reference; give command.stepping")
