@@ -13,6 +13,7 @@ from conftest import ROOT
 from identification_logs import read_all
 from lostmotion.identification import candidate_models
 from lostmotion.identification.preparation.prepare import prepared
+from lostmotion.identification.rig.residuals import start_point
 from lostmotion.identification.rig.rig_runs import run_log
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification, load_identification
@@ -142,7 +143,7 @@ def test_weights_multiply_residuals_and_leave_the_errors_as_they_are() -> None:
     for weight in ("1", "1 + 4*(ramp < 2)"):
         task, rig = task_of(weight=weight)
         (log,) = [prepared(task, log, rig.units) for log in read_all(task, EXAMPLE)]
-        engine, point = Engine(rig, threads=1), candidate_models.start_point(task, [log])
+        engine, point = Engine(rig, threads=1), start_point(task, [log])
         (residual,) = engine.residuals([log], point, 0)
         (J,) = engine.jacobians([log], point, 0, {"stiffness": candidate_models.free_on(task, 0)["stiffness"]})
         found[weight] = residual, J, log_errors([log], [residual])[0].rmse

@@ -103,7 +103,7 @@ def test_a_step_gives_the_energy_of_the_spring_times_the_step_and_every_step_is_
     )
     result = lm.simulate(scenario, energy=True)
     assert result.attrs["switching_count"] == 2 * TEETH + 1
-    assert set(lm.switchings_of(result)["cause"].values) == {lm.simulation.switchings.MESH_STEP}
+    assert set(lm.switchings_of(result)["cause"].values) == {lm.simulation.runs.switchings.MESH_STEP}
     assert f"steps of the mesh stiffness: {2 * TEETH + 1} events; in a turn of the input shaft mesh {2 * TEETH}" in (summary(result))
     ledger = lm.energy_of(result)
     stored = 0.5 * STIFFNESS * TWIST**2
@@ -132,7 +132,7 @@ def test_the_short_form_is_the_long_form_and_its_ledger_closes() -> None:
     turned = 90.0 * (short["load_angle"] + short["twist"]).values
     period, angles, _ = scenario.gearbox.mesh_stiffness.curve()
     segment = np.floor(turned[:, None] / period - np.array(angles) / period).sum(axis=1)
-    steps = int(np.sum(lm.switchings_of(short)["cause"].values == lm.simulation.switchings.MESH_STEP))
+    steps = int(np.sum(lm.switchings_of(short)["cause"].values == lm.simulation.runs.switchings.MESH_STEP))
     assert steps == int(np.abs(np.diff(segment)).sum()) > 50
 
 

@@ -660,7 +660,7 @@ def test_show_and_best_from_the_command_line(tmp_path: Path):
     table = read_table(out)
     page = (tmp_path / "page" / "study.html").read_text()
     assert not Page(page).faults
-    first = next(chart for chart in charts(page) if chart["title"] == "stuck_share over motor.friction_torque")
+    first = next(chart for chart in charts(page) if chart["title"] == "stuck share over motor friction torque")
     assert np.array_equal(first["lines"][0]["x"], table["motor.friction_torque"].to_numpy())
     assert np.array_equal(first["lines"][0]["y"], table["stuck_share"].to_numpy())
     assert len(pd.read_parquet(out)) == table.num_rows == 256  # nothing but data among the data

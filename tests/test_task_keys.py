@@ -112,7 +112,7 @@ RULE_OF: dict[str, tuple[Any, str]] = {
 COLUMN_OF = {"max_tracking_error": "tracking_error_peak", "max_reversal_error": "reversal_error", "max_settling_time": "settling_time"}
 ELSEWHERE = {  # each has a test of its own; linear, current, whole and pairs are no keys of files
     "cycle", "ambient_temperature", "hold_without_power", "max_cycles", "settling_window", "altitude", "gravity", "payload",
-    "process", "linear", "current", "whole", "pairs",
+    "process", "linear", "current", "whole", "pairs", "microsteps", "steppers",
 }  # fmt: skip
 OF_ANGLES = {"max_lost_motion": "1 um", "emergency_stop": "5 m/s^2"}
 

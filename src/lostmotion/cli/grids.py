@@ -5,8 +5,6 @@ from __future__ import annotations
 import itertools
 import re
 
-import numpy as np
-
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..units.conversion import si_value
@@ -35,6 +33,8 @@ def parse_grid(text: str, option: str, unit: str = "") -> list[float]:
         ends = [_value(entry, unit, problem) for entry in (low, high)]
         if min(ends) <= 0.0:
             raise InputError(f"{problem}, all of them above 0")
+        import numpy as np
+
         values = np.geomspace(ends[0], ends[1], int(count)).tolist() if int(count) > 1 else ends[:1]
     if min(values) <= 0.0:
         raise InputError(f"{problem}, all of them above 0")
