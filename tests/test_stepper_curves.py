@@ -136,7 +136,7 @@ def test_the_command_prints_the_curves_and_writes_them(tmp_path: Path) -> None:
     words = ["steps", str(ROOT / "scenarios" / "stepper-belt-axis.toml"), "--rates", "300.0,900.0"]
     done = CliRunner().invoke(app, [*words, "-o", str(table), "--plot", str(figure)])
     assert done.exit_code == 0, done.output
-    names, units, *rows = csv.reader(table.open())
+    names, units, *rows = csv.reader(table.read_text().splitlines())
     assert names[0] == "step_rate"
     assert units == ["Hz", "N*m", "N*m", "N*m", "N*m", "1"]
     assert [float(row[0]) for row in rows] == [300.0, 900.0]
