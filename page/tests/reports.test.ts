@@ -90,7 +90,7 @@ test("a point of a scatter tells its name", async () => {
     await page.mouse.move(middle, box.y + (box.height * k) / 40);
     if (await place.locator(".tip").isVisible()) break;
   }
-  expect(await place.locator(".tip").textContent()).toBe("second: 1, 1");
+  expect(await place.locator(".tip").textContent()).toBe("second: cost 1, mass 1");
   await page.close();
 });
 
