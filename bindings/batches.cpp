@@ -21,6 +21,13 @@ batch::Input batch_input(const BatchInput& values, const Batch& b) {
     return {values.data(), values.shape(0) != 1 || b.size() == 1};
 }
 
+template <class Batch>
+std::vector<batch::Input> batch_inputs(const std::vector<BatchInput>& values, const Batch& b) {
+    std::vector<batch::Input> out;
+    for (const BatchInput& input : values) out.push_back(batch_input(input, b));
+    return out;
+}
+
 // step() without the lock of the interpreter.
 template <class Step>
 void step_batch(Step&& step) {
@@ -106,8 +113,7 @@ void bind_exact_batch(nb::module_& m) {
             [](B& b, const std::vector<BatchInput>& inputs, const std::optional<BatchInput>& speed,
                const std::optional<BatchInput>& angle, const std::optional<BatchInput>& acceleration,
                unsigned threads) {
-                std::vector<batch::Input> given;
-                for (const BatchInput& input : inputs) given.push_back(batch_input(input, b));
+                const std::vector<batch::Input> given = batch_inputs(inputs, b);
                 std::optional<B::Motion> motion;
                 if (speed) motion.emplace(B::Motion{batch_input(*speed, b), {}, {}});
                 if (speed && angle) motion->angle = batch_input(*angle, b);
@@ -119,8 +125,7 @@ void bind_exact_batch(nb::module_& m) {
         .def(
             "answer",
             [](B& b, const std::vector<BatchInput>& inputs, int shaft, std::size_t load, unsigned threads) {
-                std::vector<batch::Input> given;
-                for (const BatchInput& input : inputs) given.push_back(batch_input(input, b));
+                const std::vector<batch::Input> given = batch_inputs(inputs, b);
                 if (!b.load_shaft(0, shaft)) throw nb::value_error("the shaft has no load torque");
                 return answers_of(
                     b.size(), [&](std::size_t k) { return b.load_shaft(k, shaft)->inertia; },

@@ -218,16 +218,15 @@ struct DriveWalk {
           p(numbers),
           load_torque(to_load),
           has_tangent(false),
-          by_command(0),
-          by_load(0),
+          tangent(),
+          by_hysteresis(0),
           x(from),
           switchings(0),
           degree(0),
           bold(false),
           doubts(0) {
         set_command(to_motor);
-        differ(0, 0);
-        has_tangent = false;
+        set_direction(0, 0);
     }
     void set_command(real to_motor) {
         const real asked = p.turned < 0 ? -to_motor : to_motor;
@@ -237,16 +236,17 @@ struct DriveWalk {
     void ask_torque(real torque, real by) {
         const real per_torque = p.per_ratio / p.stall_torque;
         set_command(p.turned * torque * per_torque);
-        by_command = command < p.command_limit && command > -p.command_limit ? by * per_torque : 0;
+        set_direction(p.turned * by * per_torque, by_load);
     }
     // Begins a tangent: the derivative by a shift of the command and of the load torque.
     void differ(real to_motor, real to_load) {
         has_tangent = true;
-        const bool acts = command < p.command_limit && command > -p.command_limit;
-        by_command = acts ? p.turned * to_motor : 0;
+        set_direction(to_motor, to_load);
+    }
+    // A command at its limit does not shift.
+    void set_direction(real to_motor, real to_load) {
+        by_command = command < p.command_limit && command > -p.command_limit ? p.turned * to_motor : 0;
         by_load = to_load;
-        for (real& each : tangent) each = 0;
-        by_hysteresis = 0;
     }
 
     bool has(int contact) const { return (p.has & contact) != 0; }

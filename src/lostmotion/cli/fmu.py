@@ -11,18 +11,7 @@ from .arguments import Overrides, SourceArgument, load_scenario
 from .targets import try_file
 from .terminal import about, busy
 
-PLATFORMS = {
-    "linux64": "Linux x86-64",
-    "x86_64-linux": "Linux x86-64",
-    "aarch64-linux": "Linux aarch64",
-    "win64": "Windows x86-64",
-    "x86_64-windows": "Windows x86-64",
-    "aarch64-windows": "Windows aarch64",
-    "darwin64": "macOS x86-64",
-    "x86_64-darwin": "macOS x86-64",
-    "aarch64-darwin": "macOS aarch64",
-}
-"""names of the directories of libraries in FMI 2.0 and 3.0"""
+SYSTEMS = {"linux": "Linux", "windows": "Windows", "darwin": "macOS"}
 
 
 def fmu(
@@ -104,11 +93,14 @@ def _platforms(path: Path) -> str:
     """The line that says where an FMU runs."""
     from zipfile import ZipFile
 
+    from ..portable.fmu import PLATFORMS
+
+    builds = {place: build for each in PLATFORMS.values() for build, (place, _) in each.items()}
     with ZipFile(path) as file:
         found = {name.split("/")[1] for name in file.namelist() if name.startswith("binaries/")}
-    shown = ", ".join(PLATFORMS.get(name, name) for name in sorted(found))
-    return f"It runs on {shown}" + (
-        "."
-        if len(found) >= len(set(PLATFORMS.values()))
-        else "; `make fmu` adds the others of Linux, Windows and macOS."
+    processors = [builds[name].partition("-") for name in sorted(found)]
+    shown = ", ".join(f"{SYSTEMS[system]} {processor.replace('_', '-')}" for processor, _, system in processors)
+    rest = (
+        "." if len(found) >= len(set(builds.values())) else "; `make fmu` adds the others of Linux, Windows and macOS."
     )
+    return f"It runs on {shown}{rest}"

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import JointDrive, JointTrains, joint_drive
-from .joints import acts, is_slide, joint_id
+from .joints import acts, is_slide, joint_id, mass_matrix
 from .mjcf import JointActuator
 
 if TYPE_CHECKING:
@@ -73,10 +73,7 @@ class Actuated:
         self._addresses = np.array([model.jnt_qposadr[j] for j in ids])
         step = float(model.opt.timestep)
         mujoco.mj_setConst(model, self.data)  # the inertia of simple bodies has the armature that was taken off
-        mujoco.mj_forward(model, self.data)
-        mass = np.zeros((model.nv, model.nv))
-        mujoco.mj_fullM(model, self.data, mass)
-        inertias = 1.0 / np.diag(np.linalg.inv(mass))[self._dofs]
+        inertias = 1.0 / np.diag(np.linalg.inv(mass_matrix(model, self.data)))[self._dofs]
         made = [
             joint_drive(name, actuator.drive, float(inertia), step, slides=is_slide(model, joint))
             for (name, actuator), joint, inertia in zip(given.items(), ids, inertias, strict=True)

@@ -48,6 +48,20 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Sce
     return scenario.with_axes(dict.fromkeys(motors, controller))
 
 
+def alone_on_joint(
+    robot: mujoco.MjModel, joint: str, given: Any, controller: Controller | None, *, replace: bool
+) -> Scenario:
+    """The same, with what robot and drive both have taken off one of them.
+
+    Raises InputError: there is such a thing, and it is not to be replaced.
+    """
+    heavy = (robot.body_mass > 0.0) & (robot.body_gravcomp != 1.0)
+    weighs = bool(robot.opt.gravity.any() and heavy.any()) and acts(robot, "GRAVITY")
+    drive = without_weight(joint, drive_of_joint(joint, given, controller), replace=replace, weighs=weighs)
+    clear(robot, joint, drive, replace=replace)
+    return drive
+
+
 def _named(joint: str, name: str) -> Drive | Scenario:
     """Shipped scenario or scenario file by its name; an actuator of the catalogue; a gearbox, with an ideal torque source."""
     if name.endswith(".toml") or name in shipped_scenarios():
@@ -155,14 +169,10 @@ def attach(
             raise InputError(f"model: has {what}, which are not supported; use such without")
     if substeps is not None and not 1 <= substeps <= MAX_SUBSTEPS:
         raise InputError(f"substeps: {shown(substeps)} must lie between 1 and {MAX_SUBSTEPS}")
-    heavy = (robot.body_mass > 0.0) & (robot.body_gravcomp != 1.0)
-    weighs = bool(robot.opt.gravity.any() and heavy.any()) and acts(robot, "GRAVITY")
     made: dict[str, JointActuator] = {}
     for name, given in drives.items():
         joint_id(robot, name)
         actuator = given if isinstance(given, JointActuator) else JointActuator(given)
-        drive = drive_of_joint(name, actuator.drive, (controllers or {}).get(name))
-        drive = without_weight(name, drive, replace=replace, weighs=weighs)
-        clear(robot, name, drive, replace=replace)
+        drive = alone_on_joint(robot, name, actuator.drive, (controllers or {}).get(name), replace=replace)
         made[name] = dataclasses.replace(actuator, drive=drive)
     return Actuated(robot, made, substeps)

@@ -5,6 +5,8 @@ from __future__ import annotations
 import copy
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from ..errors import InputError
 from ..inputs.validation import did_you_mean, listed, shown
 
@@ -38,6 +40,16 @@ def joint_id(model: mujoco.MjModel, name: str) -> int:
     if model.jnt_type[found] not in moved:
         raise InputError(f"joint {name!r}: is neither a hinge nor a slide, which drives move")
     return int(found)
+
+
+def mass_matrix(model: mujoco.MjModel, data: mujoco.MjData) -> np.ndarray:
+    """The mass matrix where `data` is, all that follows from its positions computed anew."""
+    import mujoco
+
+    mass = np.zeros((model.nv, model.nv))
+    mujoco.mj_forward(model, data)
+    mujoco.mj_fullM(model, data, mass)
+    return mass
 
 
 def is_slide(model: mujoco.MjModel, joint: int) -> bool:

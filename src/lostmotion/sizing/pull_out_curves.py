@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -27,6 +27,7 @@ from ..simulation.scenario.scenario import Scenario
 if TYPE_CHECKING:
     import xarray
 
+RATES = 10.0, 1e6  # [Hz], of full steps
 HALVINGS = 8
 """of the holding torque: a run decides each"""
 SPEEDING, RAMP, HOLD = 60.0, 30.0, 15.0
@@ -83,7 +84,8 @@ def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = N
     """
     import xarray
 
-    name = _stepper(scenario, motor)
+    steppers = [name for name, m in scenario.train().motors.items() if m.kind == "stepper"]
+    name = one_stepper(steppers, motor, 'the scenario has no motor of kind "stepper"')
     rates = _rates(step_rates)
     axis = _Axis.of(scenario, name)
     rows = [
@@ -99,15 +101,18 @@ def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = N
     return xarray.Dataset(data, {"step_rate": ("step_rate", rates, {"units": "Hz"})}, {"motor": name})
 
 
-def _stepper(scenario: Scenario, motor: str | None) -> str:
-    steppers = [name for name, m in scenario.train().motors.items() if m.kind == "stepper"]
+def one_stepper(steppers: Sequence[str], motor: str | None, without: str) -> str:
+    """The stepper that is meant. without: what is wrong where there is none.
+
+    Raises InputError: there is none, there are several, or `motor` is none of them.
+    """
     if not steppers:
-        raise InputError('the scenario has no motor of kind "stepper"')
+        raise InputError(without)
     if motor is None and len(steppers) > 1:
         raise InputError(f"motor: there are several steppers; give one of {', '.join(steppers)}")
     if motor is not None and motor not in steppers:
         meant = did_you_mean(motor, steppers, f"the steppers are {', '.join(steppers)}")
-        raise InputError(f"motor: {shown(motor)} is no stepper; {meant}")
+        raise InputError(f"motor: {shown(motor)} is no such stepper; {meant}")
     return motor or steppers[0]
 
 
@@ -124,9 +129,6 @@ def _rates(step_rates: Any) -> np.ndarray:
             f"step_rates: {shown(step_rates)} must lie between {low:g} and {high:g} Hz; below that a stepper gives its holding torque"
         )
     return rates
-
-
-RATES = 10.0, 1e6  # [Hz], of full steps
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from ..control.turning import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number
-from ..inputs.validation import did_you_mean, shown
 from ..model.torsion import Rigid
 from ..simulation.runs.lost_steps import LostSteps, found_in
 from ..simulation.runs.pointing_error import pointed, pointing_errors, pointing_names
@@ -21,6 +20,7 @@ from ..simulation.scenario.one_axis import OneAxis
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import practical
 from ..verdict import Point, Verdict
+from .pull_out_curves import one_stepper
 
 MICROSTEPS_OF_WINDOW = 4.0  # at the load, in the window by default
 NO_LOOP = "a stepper is turned without a loop, so it has no margins and nothing to tune; of its motion see the open-loop report"
@@ -111,14 +111,7 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
     if window is not None and not 0.0 < window < math.inf:
         raise InputError(f"window: {window:g} must be above 0")
     axes = [name for name in pointed(scenario) if scenario.train().motors[name].kind == "stepper"]
-    if not axes:
-        raise InputError("the scenario has no stepper that follows a reference; give command.stepping")
-    if motor is None and len(axes) > 1:
-        raise InputError(f"motor: there are several steppers; name one of {', '.join(axes)}")
-    name = motor or axes[0]
-    if name not in axes:
-        meant = did_you_mean(name, axes, f"they are {', '.join(axes)}")
-        raise InputError(f"motor: {shown(name)} is no such stepper; {meant}")
+    name = one_stepper(axes, motor, "the scenario has no stepper that follows a reference; give command.stepping")
     train, (reference, shaft) = scenario.train(), pointed(scenario)[name]
     m, ratio = train.motors[name], turns(train, train.motors[name].shaft, shaft)
     assert m.steps_per_revolution is not None

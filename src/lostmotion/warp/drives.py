@@ -94,7 +94,7 @@ class Drives:
         except ValueError as problem:
             raise InputError(f"device: {problem}; give such as 'cuda:0' or 'cpu'") from None
         self._count, self._dtype = count, np.dtype(dtype)
-        self._wp, self._number = wp, wp.float32 if dtype == "float32" else wp.float64
+        self._wp, self._number = wp, kernel.NUMBER[dtype]
         self._arrays = kernel.drive_arrays(dtype)()
         self._arrays.count = count
         for name, part in zip(("tables", "offsets", "shape"), kernel.packed(laws, dtype), strict=True):
@@ -181,7 +181,7 @@ class Drives:
         return first, second
 
     def _advance(self, command: Any, load_torque: Any, step: float, *, answers: bool) -> None:
-        given = [self._input(*pair) for pair in ((command, self._commands), (load_torque, self._loads))]
+        given = self._input("command", command, self._commands), self._input("load_torque", load_torque, self._loads)
         self._wp.launch(
             self._kernel, dim=self._count, inputs=[self._arrays, *given, step, int(answers)], device=self._device
         )
@@ -216,15 +216,16 @@ class Drives:
             raise InputError(f"{key}: is no parameter of these drives; the parameters are {listed(tuple(self._keys))}")
         return self._keys[number]
 
-    def _input(self, value: Any, kept: Any) -> Any:
+    def _input(self, what: str, value: Any, kept: Any) -> Any:
+        """What a kernel reads: an array of Warp as it is, or else an array of the same shape, with the numbers that are given."""
         if isinstance(value, self._wp.array):
-            if value.shape != (self._count,) or value.dtype != self._number:
-                raise InputError(f"an input must have {self._count} numbers of type {self._dtype}")
+            if value.shape != kept.shape or value.dtype != self._number:
+                raise InputError(f"{what}: must have {len(kept)} numbers of type {self._dtype}")
             return value
         if np.ndim(value) == 0:
             kept.fill_(float(value))
         else:
-            kept.assign(np.broadcast_to(np.asarray(value, dtype=self._dtype), (self._count,)))
+            kept.assign(np.broadcast_to(np.asarray(value, dtype=self._dtype), kept.shape))
         return kept
 
 

@@ -11,9 +11,8 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.validation import listed, shown
-from ..mujoco.attaching import drive_of_joint
-from ..mujoco.joints import acts, compiled, refuse_slide
-from ..mujoco.overlaps import clear, without_weight
+from ..mujoco.attaching import alone_on_joint
+from ..mujoco.joints import compiled, mass_matrix, refuse_slide
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives
 
@@ -172,16 +171,9 @@ class _Group:
 
     def command(self, k: int, given: Any, worlds: int) -> None:
         place = self.rows(self._commands, k, worlds)
-        if isinstance(given, self.drives._wp.array):
-            if given.shape != (worlds,) or given.dtype != place.dtype:
-                raise InputError(
-                    f"commands.{self.names[k]}: must have {worlds} numbers of type {self.drives._dtype}, one for each world"
-                )
-            self.drives._wp.copy(place, given)
-        elif np.ndim(given) == 0:
-            place.fill_(float(given))
-        else:
-            place.assign(np.broadcast_to(np.asarray(given, dtype=self.drives._dtype), (worlds,)))
+        found = self.drives._input(f"commands.{self.names[k]}", given, place)
+        if found is not place:
+            self.drives._wp.copy(place, found)
 
     def launch(self, wp: Any, step: float) -> None:
         wp.launch(
@@ -277,13 +269,11 @@ def attach(
     if not drives:
         raise InputError("drives: is empty; name at least one joint")
     robot = compiled(model)
-    weighs = bool(robot.opt.gravity.any()) and acts(robot, "GRAVITY")
     gains = _gains(drives, stiffness, damping)
     made = {}
     for name, given in drives.items():
         refuse_slide(robot, name, "lm.warp.attach")
-        scenario = without_weight(name, drive_of_joint(name, given, None), replace=False, weighs=weighs)
-        clear(robot, name, scenario, replace=False)
+        scenario = alone_on_joint(robot, name, given, None, replace=False)
         kinds = {motor.kind for motor in scenario.train().motors.values()}
         if name in gains and kinds != {"torque_source"}:
             raise InputError(
@@ -297,10 +287,7 @@ def _inertias(model: mujoco.MjModel) -> np.ndarray:
     """The diagonal of the mass matrix [kg·m²] in the reference pose, for the first step."""
     import mujoco
 
-    data, matrix = mujoco.MjData(model), np.zeros((model.nv, model.nv))
-    mujoco.mj_forward(model, data)
-    mujoco.mj_fullM(model, data, matrix)
-    return np.diag(matrix).copy()
+    return np.diag(mass_matrix(model, mujoco.MjData(model))).copy()
 
 
 def _gains(

@@ -45,6 +45,7 @@ WHOLE = ("pieces", "zero", "losses", "n_speeds", "n_loads", "most_degree")
 FLAGS = ("has_gap", "rigid", "delays_torque", "limits_damping", "torque_source")
 CORE = "loss_grid.hpp", "drive_walk.hpp"
 DEGREE = {"float32": 14, "float64": 23}
+NUMBER = {"float32": wp.float32, "float64": wp.float64}
 LIMIT = 1e30  # in place of infinity, which single precision has, too, but compilers may assume away
 
 TOLD = ("load_torque", "speed", "per_torque", "command", "angle")
@@ -186,7 +187,7 @@ def _body(dtype: str, last: str, *headers: str) -> str:
 @cache
 def drive_arrays(dtype: str) -> Any:
     """The arrays of drives, as a structure of Warp."""
-    number = wp.float32 if dtype == "float32" else wp.float64
+    number = NUMBER[dtype]
 
     @wp.struct
     class DriveArrays:
@@ -209,7 +210,7 @@ def drive_arrays(dtype: str) -> Any:
 @cache
 def engine_arrays(dtype: str) -> Any:
     """What drives read and write of the joints that they turn, as a structure of Warp."""
-    number = wp.float32 if dtype == "float32" else wp.float64
+    number = NUMBER[dtype]
 
     @wp.struct
     class EngineArrays:
@@ -236,7 +237,7 @@ def engine_arrays(dtype: str) -> Any:
 @cache
 def advance_kernel(dtype: str) -> Any:
     """The kernel that advances drives with numbers of a type. Drives of all kinds share it."""
-    number = wp.float32 if dtype == "float32" else wp.float64
+    number = NUMBER[dtype]
     arrays = drive_arrays(dtype)
 
     @wp.func_native(_body(dtype, ADVANCE))
@@ -261,7 +262,7 @@ def advance_kernel(dtype: str) -> Any:
 @cache
 def joint_kernel(dtype: str) -> Any:
     """The kernel by which drives follow what an engine has found, and tell it what acts in the next step."""
-    number = wp.float32 if dtype == "float32" else wp.float64
+    number = NUMBER[dtype]
     arrays, joints = drive_arrays(dtype), engine_arrays(dtype)
 
     @wp.func_native(_body(dtype, JOINT, "joint_step.hpp"))
