@@ -141,7 +141,7 @@ def test_what_friction_holds_does_not_creep() -> None:
 
 @pytest.mark.parametrize("samples", [1, 4])
 def test_a_law_of_the_motor_acts_at_its_samples(samples: int) -> None:
-    # Of the angles and speeds of motor (over the ratio) and load: linear between samples, at which the torque is set anew.
+    # The state has the angles and speeds of motor (over the ratio) and load. It is linear between samples, at which the torque is set anew.
     step, ratio, rotor, load, mesh = 0.004, 50.0, 50.0**2 * 1e-4, 1.0, 1e4
     stiffness, damping, goal = 300.0, 15.0, 0.2
     robot = Robot(

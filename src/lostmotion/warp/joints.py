@@ -97,7 +97,7 @@ class Joints:
 
         Notes
         -----
-        Sets ``m.dof_armature`` and ``d.qfrc_applied`` of these joints, and ``d.qvel`` of those that dry friction holds.
+        Writes ``m.dof_armature``, ``d.qfrc_applied``, ``d.qpos`` and ``d.qvel`` of these joints.
         """
         for name, given in self._by_name(commands).items():
             group, k = self._places[name]

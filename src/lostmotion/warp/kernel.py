@@ -101,7 +101,7 @@ JOINT = """
     real load_torque = 0;
     int doubts = 0;
     if (per_torque < 0) {{
-        // The engine has found a speed, by the line that it was told. The load torque that belongs to it there gives the motion.
+        // The engine has found a speed with the line that it was told. The load torque of that line at this speed moves the drive.
         it.command = engine.told.data[3 * n + i];
         it.angle = engine.told.data[4 * n + i];
         load_torque = engine.told.data[i] + (real(speed) - engine.told.data[n + i]) / per_torque;
