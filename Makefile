@@ -210,7 +210,7 @@ lint-words: $(VENV)/libraries
 .PHONY: stub
 stub: $(VENV)/built
 	$(BIN)/python -m nanobind.stubgen -q -m lostmotion._core -o src/lostmotion/_core.pyi
-	$(BIN)/python -c 'import lostmotion.simulation.forms.train_tables; from lostmotion.inputs.described import stub; print(stub(), end="")' > src/lostmotion/inputs/described.pyi
+	$(BIN)/python -c 'import lostmotion.simulation.forms.train_tables; from lostmotion.inputs.core_parameters import stub; print(stub(), end="")' > src/lostmotion/inputs/core_parameters.pyi
 
 format: $(VENV)/dev
 	$(BIN)/ruff check --fix .

@@ -11,12 +11,12 @@ import cma
 import numpy as np
 from report import Report
 
-from lostmotion.identification.fit.least_squares import Problem, moved, problem_of, search
+from lostmotion.identification.fit.least_squares import FitProblem, moved, problem_of, search
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
-from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.residuals import Engine, ParameterPoint
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import free_on, load_identification
 from lostmotion.identification.virtual_logs import virtual_log
@@ -71,7 +71,7 @@ class ByDifferences(Engine):
         return super().jacobians(logs, point, rung, parameters)
 
 
-def fitted(rig: Rig, engine: Engine, train: list[Prepared], start: Point, goal: float) -> tuple[float, float]:
+def fitted(rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, goal: float) -> tuple[float, float]:
     """(processor time [s], cost) when a search has arrived."""
     reached: list[float] = []
     begin = time.process_time()
@@ -84,12 +84,12 @@ def fitted(rig: Rig, engine: Engine, train: list[Prepared], start: Point, goal: 
     return (reached or [time.process_time() - begin])[0], fit.cost
 
 
-def problem(rig: Rig, engine: Engine, train: list[Prepared]) -> Problem:
+def problem(rig: Rig, engine: Engine, train: list[Prepared]) -> FitProblem:
     """With the deviation of noise and steps, so that costs of different points can be compared."""
     return replace(problem_of(rig, engine, train, RUNG), given=np.array([np.hypot(5e-4, 1.534e-3 / np.sqrt(12.0))]))
 
 
-def by_cma(p: Problem, start: Point, goal: float) -> tuple[float, float, int]:
+def by_cma(p: FitProblem, start: ParameterPoint, goal: float) -> tuple[float, float, int]:
     """(processor time [s], cost, points tried)."""
     names = list(p.parameters)
     begin = time.process_time()
@@ -100,7 +100,7 @@ def by_cma(p: Problem, start: Point, goal: float) -> tuple[float, float, int]:
         costs = []
         for x in tried:
             values = {n: moved(p.parameters[n], start.values[n], float(v)) for n, v in zip(names, x, strict=True)}
-            point = Point(start.values | values, start.nuisance)
+            point = ParameterPoint(start.values | values, start.nuisance)
             found = p.cost(p.engine.residuals(p.logs, point, p.rung), p.given, point, 1.0)
             costs.append(found if np.isfinite(found) else 1e12)
         es.tell(tried, costs)
@@ -115,16 +115,16 @@ def section(report: Report) -> None:
     task = task.model_copy(update={"ladder": (lowest, load, direction)})
     rig = Rig(task, directory)
     free = free_on(task, RUNG)
-    start = Point({n: p.start for n, p in task.parameters.items()}, {})
+    start = ParameterPoint({n: p.start for n, p in task.parameters.items()}, {})
 
     many, engine = logs(rig, 100), Engine(rig)
     steps = []
     for k in range(3):  # each at other values, as in a search: nothing is at hand from the last
-        point = Point(start.values | {"coulomb_friction": 0.05 + 1e-3 * k}, {})
+        point = ParameterPoint(start.values | {"coulomb_friction": 0.05 + 1e-3 * k}, {})
         begin, processor = time.perf_counter(), time.process_time()
         engine.jacobians(many, point, RUNG, free)
         gradient, of_gradient = time.perf_counter() - begin, time.process_time() - processor
-        engine.residuals(many, Point(point.values | {"armature": 0.011}, {}), RUNG)
+        engine.residuals(many, ParameterPoint(point.values | {"armature": 0.011}, {}), RUNG)
         steps.append((time.perf_counter() - begin, time.process_time() - processor, gradient, of_gradient))
     wall, processor, gradient, of_gradient = min(steps)
 
@@ -134,7 +134,7 @@ def section(report: Report) -> None:
 
     few = logs(rig, 6)
     truth = problem(rig, Engine(rig, 1), few)
-    least = search(truth, Point(start.values | TRUTH, {}), iterations=10).cost
+    least = search(truth, ParameterPoint(start.values | TRUTH, {}), iterations=10).cost
     goal = NEAR * least
     exact, cost = fitted(rig, Engine(rig, 1), few, start, goal)
     differences, cost_of_differences = fitted(rig, ByDifferences(rig, 1), few, start, goal)

@@ -16,7 +16,7 @@ from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.nearest_misses import not_judged
-from lostmotion.studies.selection.ranking import Candidate
+from lostmotion.studies.selection.ranking import RankedCandidate
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study import Study
 
@@ -245,7 +245,7 @@ def test_records_that_cannot_be_judged_are_grouped_by_what_they_lack():
     errors = [lm.InputError(lacks, table="actuator", record=f"'a-{k}'") for k in range(3)]
     assert str(errors[1]) == "actuator from 'a-1': the record lacks rotor_inertia, see the manufacturer"
     missing = [(error.problems[0].of_any_record(),) for error in errors]
-    ranked = [Candidate(k, f"a-{k}", ("data",), str(errors[k]), "", {}, missing=missing[k]) for k in range(3)]
+    ranked = [RankedCandidate(k, f"a-{k}", ("data",), str(errors[k]), "", {}, missing=missing[k]) for k in range(3)]
     (group,) = not_judged(ranked)
     assert group.datum == "actuator: the record lacks rotor_inertia, see the manufacturer"
     assert len(group.candidates) == 3

@@ -12,8 +12,8 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from lostmotion.cli import app
 from lostmotion.response.windows import fitting
-from lostmotion.servo.regimes import axis_of, regimes
-from lostmotion.servo.sampled import SampledLoop
+from lostmotion.servo.linear_regimes import axis_of, regimes
+from lostmotion.servo.linear_sampled_loop import LinearLoop
 from two_mass import T, two_mass
 
 
@@ -28,10 +28,10 @@ def two_masses(kind: str, **changes: Any) -> lm.Scenario:
     return two_mass(speed, **(controller | changes))
 
 
-def exact_loop(scenario: lm.Scenario, loop: str) -> SampledLoop:
+def exact_loop(scenario: lm.Scenario, loop: str) -> LinearLoop:
     axis = axis_of(scenario)
     (regime,) = regimes(axis)
-    return SampledLoop(axis, regime, loop, False)
+    return LinearLoop(axis, regime, loop, False)
 
 
 FREQUENCIES = [0.5, 3.0, 10.0, 33.0, 77.7, 190.0]

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from lostmotion.cli import app
-from lostmotion.inputs.doubts import LARGEST, ValueWarning, doubt_all
+from lostmotion.inputs.implausible_values import LARGEST, ValueWarning, doubt_all
 from lostmotion.simulation.scenario.units_of_keys import unit_for
 
 JOINT = "catalogue-robot-joint"

@@ -14,7 +14,7 @@ from scipy.linalg import expm
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.model.signals import SpeedSignal
+from lostmotion.model.signals import GivenSpeedSignal
 
 SPRING = {"kind": "linear", "stiffness": 100.0}
 CASE: dict[str, Any] = {
@@ -460,7 +460,7 @@ def test_a_given_shaft_needs_no_inertia_behind_backlash(ratio: float) -> None:
 
 
 def test_a_wave_of_speed_is_continuous() -> None:
-    assert SpeedSignal(mean=2.0, amplitude=1.0, frequency=1.0, phase=0.5).at_start() == pytest.approx(2.0 + math.sin(0.5))
+    assert GivenSpeedSignal(mean=2.0, amplitude=1.0, frequency=1.0, phase=0.5).at_start() == pytest.approx(2.0 + math.sin(0.5))
 
 
 def test_steps_meet_the_motion_that_is_given_at_their_ends() -> None:

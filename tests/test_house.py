@@ -14,7 +14,7 @@ import pytest
 
 import lostmotion
 from conftest import ROOT, run_in_build
-from lostmotion.inputs import described
+from lostmotion.inputs import core_parameters
 from public_names import PATHS, public
 
 PACKAGE = ROOT / "src" / "lostmotion"
@@ -63,8 +63,8 @@ INNER = {
     ],
     "servo": [
         {"winding"},
-        {"regimes"},
-        {"tuning_data", "sampled"},
+        {"linear_regimes"},
+        {"tuning_data", "linear_sampled_loop"},
         {"margins"},
         {"axis_runs"},
         {"hunting"},
@@ -263,8 +263,8 @@ def test_every_public_name_exists_and_is_documented() -> None:
 def test_no_part_states_again_what_the_core_describes() -> None:
     assert lostmotion.simulation.TrainTables.model_fields  # with it all parts are made
     assert lostmotion.simulation.DriveTables.model_fields
-    bases = described.Described.__subclasses__()
-    assert {base.__name__ for base in bases} == {f"{table}Fields" for table in described.TABLES}
+    bases = core_parameters.Described.__subclasses__()
+    assert {base.__name__ for base in bases} == {f"{table}Fields" for table in core_parameters.TABLES}
     parts = [part for base in bases for part in base.__subclasses__()]
     assert {part.__name__: set(part.described) & set(vars(part).get("__annotations__", {})) for part in parts} == {
         part.__name__: set() for part in parts
@@ -272,7 +272,7 @@ def test_no_part_states_again_what_the_core_describes() -> None:
 
 
 def test_every_described_parameter_says_what_it_is() -> None:
-    for table, rows in described.TABLES.items():
+    for table, rows in core_parameters.TABLES.items():
         for key, kind, symbol, unit, meaning, _, needed, default, _ in rows:
             assert symbol or meaning, f"{table}.{key}"
             assert unit or kind != "pair" or key in ("limits", "loss_range"), f"{table}.{key}"
@@ -298,7 +298,7 @@ def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "nanobind.stubgen", "-q", "-m", "lostmotion._core", "-o", str(tmp_path / "_core.pyi")]
     subprocess.run(command, check=True)
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
-    assert described.stub() == (PACKAGE / "inputs" / "described.pyi").read_text(), "run: make stub"
+    assert core_parameters.stub() == (PACKAGE / "inputs" / "described.pyi").read_text(), "run: make stub"
 
 
 def test_a_build_of_the_core_that_is_not_there_is_refused() -> None:

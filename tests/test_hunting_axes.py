@@ -8,7 +8,7 @@ import numpy as np
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.servo.hunting.at_rest import without_backlash, without_friction
+from lostmotion.servo.hunting.limit_cycle_causes import without_backlash, without_friction
 from lostmotion.servo.hunting.limit_cycles import UndrivenLoop
 
 AXES = some(24, 12)

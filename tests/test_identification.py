@@ -24,7 +24,7 @@ from lostmotion.identification.identify import _notes, identify_task
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.readers.log import Channel
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig.residuals import Engine, Point, start_point
+from lostmotion.identification.rig.residuals import Engine, ParameterPoint, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.file_formulas import Formula
 from lostmotion.identification.task.identification_file import Identification, free_on
@@ -345,7 +345,8 @@ def test_the_jacobian_is_that_of_a_larger_difference(logs: Path) -> None:
     h = 0.05 * free["viscous_friction"].step
     values = point.of(log)
     up, down = (
-        engine.residuals([log], Point(values | {"viscous_friction": values["viscous_friction"] + s * h}, {}), 0)[0] for s in (1, -1)
+        engine.residuals([log], ParameterPoint(values | {"viscous_friction": values["viscous_friction"] + s * h}, {}), 0)[0]
+        for s in (1, -1)
     )
     assert J[..., 0] == pytest.approx((up - down) / (2 * h), abs=5e-3 * float(np.max(np.abs(J))))
 

@@ -12,7 +12,7 @@ from identification_logs import SERVO, TRUTH, servo_plans, servo_task
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
-from lostmotion.identification.rig.residuals import Engine, Point
+from lostmotion.identification.rig.residuals import Engine, ParameterPoint
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.free_parameters import FreeParameter
 from lostmotion.identification.task.identification_file import Identification, free_on
@@ -20,7 +20,7 @@ from lostmotion.identification.virtual_logs import virtual_log
 
 
 def small_differences(engine: Engine, log: Prepared, values: dict[str, float], rung: int, name: str, h: float) -> np.ndarray:
-    up, down = (engine.residuals([log], Point({**values, name: values[name] + s * h}, {}), rung)[0] for s in (1, -1))
+    up, down = (engine.residuals([log], ParameterPoint({**values, name: values[name] + s * h}, {}), rung)[0] for s in (1, -1))
     return (up - down) / (2.0 * h)
 
 
@@ -28,7 +28,7 @@ def check(engine: Engine, log: Prepared, values: dict[str, float], rung: int, fr
     """Differences over 1e-5 of a value err by its square, by 1e-14 over 1e-7 in rounding, and more where a switching lies between
     the runs beside and the sample: at the worst samples.
     """
-    (J,) = engine.jacobians([log], Point(values, {}), rung, free)
+    (J,) = engine.jacobians([log], ParameterPoint(values, {}), rung, free)
     assert not engine.by_differences and not engine.touching
     for k, (name, p) in enumerate(free.items()):
         D = small_differences(engine, log, values, rung, name, 1e-5 * max(abs(values[name]), p.step))
@@ -73,7 +73,7 @@ def test_scale_offset_delay_and_filter_of_channels_are_parameters_too() -> None:
     plan = servo_plans(1, duration=1.5)[0]
     log = prepared(rig.task, virtual_log(rig, plan, TRUTH | {"direction": 0.0}, rung=0), rig.units)
     values = {n: p.start for n, p in rig.task.parameters.items()}
-    (J,) = Engine(rig, 1).jacobians([log], Point(values, {}), 0, free_on(rig.task, 0))
+    (J,) = Engine(rig, 1).jacobians([log], ParameterPoint(values, {}), 0, free_on(rig.task, 0))
     for k, (name, p) in enumerate(free_on(rig.task, 0).items()):
         D = small_differences(Engine(rig, 1), log, values, 0, name, 1e-5 * max(abs(values[name]), p.step))
         for own, wanted in zip(J[..., k], D, strict=True):
@@ -151,7 +151,7 @@ def test_a_delay_of_steps_that_a_sampled_controller_reads_is_by_differences(tmp_
     rig, log = axis(tmp_path, "hold")
     values = {n: p.start for n, p in rig.task.parameters.items()}
     engine, free = Engine(rig, threads=1), free_on(rig.task, 0)
-    (J,) = engine.jacobians([log], Point(values, {}), 0, free)
+    (J,) = engine.jacobians([log], ParameterPoint(values, {}), 0, free)
     assert list(engine.by_differences) == ["late"] and "held between samples" in engine.by_differences["late"]
     # The parts of the delay that count are whole samples of the log.
     D = small_differences(engine, log, values, 0, "late", 1e-2 * free["late"].step)
@@ -180,6 +180,6 @@ def test_logs_of_one_rig_at_once_are_the_logs_one_by_one() -> None:
     ]
     values = {n: p.start for n, p in task.parameters.items()}
     free = free_on(task, 2)
-    together = Engine(rig, 2).jacobians(logs, Point(values, {}), 2, free)
+    together = Engine(rig, 2).jacobians(logs, ParameterPoint(values, {}), 2, free)
     for log, J in zip(logs, together, strict=True):
-        assert np.array_equal(Engine(rig, 1).jacobians([log], Point(values, {}), 2, free)[0], J)
+        assert np.array_equal(Engine(rig, 1).jacobians([log], ParameterPoint(values, {}), 2, free)[0], J)

@@ -13,7 +13,7 @@ from lostmotion.identification.fit.saved_progress import Progress
 from lostmotion.identification.identify import identify_task
 from lostmotion.identification.preparation.usable_logs import gathered
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig.residuals import Point
+from lostmotion.identification.rig.residuals import ParameterPoint
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification
 from lostmotion.reports.identification import write_identification
@@ -120,8 +120,8 @@ def test_models_of_other_logs_are_not_continued(tmp_path: Path) -> None:
     progress = Progress(kept)
     rig = Rig(task, tmp_path)
     logs, _ = gathered(rig, tmp_path)
-    progress.of(task, logs).keep("mass", Point({"mass": 95.0}, {}), [])
-    assert Progress(kept).of(task, logs).fitted("mass") == (Point({"mass": 95.0}, {}), [])
+    progress.of(task, logs).keep("mass", ParameterPoint({"mass": 95.0}, {}), [])
+    assert Progress(kept).of(task, logs).fitted("mass") == (ParameterPoint({"mass": 95.0}, {}), [])
     assert Progress(kept).of(task, logs[1:]).fitted("mass") is None
     kept.write_text("{")
     assert Progress(kept).of(task, logs).fitted("mass") is None

@@ -12,12 +12,12 @@ from conftest import some
 from lostmotion import Simulation, load
 from lostmotion.identification.fit.input_courses import course_of
 from lostmotion.identification.fit.intervals import bootstrap
-from lostmotion.identification.fit.least_squares import Fit, Problem, problem_of
+from lostmotion.identification.fit.least_squares import Fit, FitProblem, problem_of
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.result import IdentificationResult
-from lostmotion.identification.rig.residuals import Engine, Point, start_point
+from lostmotion.identification.rig.residuals import Engine, ParameterPoint, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.free_parameters import FreeParameter
 from lostmotion.identification.task.identification_file import FitOptions, Identification
@@ -261,11 +261,11 @@ def test_errors_that_last_through_a_log_widen_the_interval() -> None:
     g = np.array([1.0, -1.0, 2.0, -2.0, 0.5, -0.5, 1.5, -1.5])
     scores = [np.full((12, 1), 1000.0 * value / 12.0) for value in g]
     p = FreeParameter(start=0.0, min=-1e6, max=1e6, scale=1.0)
-    point = Point({"x": 0.0}, {})
+    point = ParameterPoint({"x": 0.0}, {})
     fit = Fit(point, 0.0, 0.0, np.ones(1), ("x",), 1, normal=np.array([[1e4]]), scores=scores)
     options = FitOptions(leave_out=())
     logs: list[Any] = [None] * 8
-    alone: Any = Problem(None, logs, 0, {"x": p}, {}, options)  # type: ignore[arg-type]
+    alone: Any = FitProblem(None, logs, 0, {"x": p}, {}, options)  # type: ignore[arg-type]
     i = bootstrap(alone, fit)["x"]
     # Student's t with 7 degrees of freedom for the sum of eight values. A quantile of 2000 draws has a standard error of 3 %.
     expected = 2.365 * np.sqrt(8.0) * 1000.0 * np.std(g, ddof=1) / 1e4

@@ -17,7 +17,7 @@ from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.prepared_log import Prepared
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.rig.measured_motion import windows
-from lostmotion.identification.rig.residuals import Engine, Point, start_point
+from lostmotion.identification.rig.residuals import Engine, ParameterPoint, start_point
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification, free_on
 from lostmotion.identification.virtual_logs import virtual_log
@@ -193,7 +193,7 @@ def test_a_measured_torque_serves_in_a_closed_loop(tmp_path: Path) -> None:
         logs.append(prepared(rig.task, virtual_log(rig, plan, truth, rung=0, noise=noise, seed=k), rig.units))
     begin = start_point(rig.task, logs)
     known = ("torque_constant", "resistance", "dead_time")
-    begin = Point(begin.values | {name: truth[name] for name in known}, begin.nuisance)
+    begin = ParameterPoint(begin.values | {name: truth[name] for name in known}, begin.nuisance)
     _, start = regressed(rig, Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
     for name in ("armature", "coulomb_friction"):
         assert start.found[name] == pytest.approx(truth[name], rel=0.15)
@@ -232,7 +232,7 @@ def test_windows_that_grow_find_what_whole_logs_miss(tmp_path: Path) -> None:
 def test_runs_in_windows_begin_at_what_was_measured_and_have_exact_derivatives(tmp_path: Path) -> None:
     rig = swing_rig(tmp_path)
     logs = free_swings(rig, SWING)
-    far, near = start_point(rig.task, logs), Point(dict(SWING, radius=0.1), {})
+    far, near = start_point(rig.task, logs), ParameterPoint(dict(SWING, radius=0.1), {})
     cut, engine = windows(rig, logs, far, 0, 0.25), Engine(rig, threads=1)
     assert [len(log.segments) for log in cut] == [20, 20]
     # The slope of a cubic through 2 m + 1 samples at a distance h has the variance 25/4 * 3/(m (m + 1) (2 m + 1)) (NOISE/h)^2; at
@@ -243,7 +243,7 @@ def test_runs_in_windows_begin_at_what_was_measured_and_have_exact_derivatives(t
         assert NOISE < np.std(r) < np.hypot(NOISE, 0.25 * slope)
     free = {"weight": rig.task.parameters["weight"]}
     h = 1e-5
-    up, down = (engine.residuals(cut, Point({**near.values, "weight": near.values["weight"] + s * h}, {}), 0) for s in (1, -1))
+    up, down = (engine.residuals(cut, ParameterPoint({**near.values, "weight": near.values["weight"] + s * h}, {}), 0) for s in (1, -1))
     for J, a, b in zip(engine.jacobians(cut, near, 0, free), up, down, strict=True):
         assert J[..., 0] == pytest.approx((a - b) / (2.0 * h), abs=1e-4 * np.abs(J).max())
 

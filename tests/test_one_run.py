@@ -15,7 +15,7 @@ import xarray as xr
 import lostmotion as lm
 from conftest import ALL_SCENARIOS
 from lostmotion import _core
-from lostmotion.inputs.kept import kept_while_used
+from lostmotion.inputs.cached_values import kept_while_used
 from lostmotion.inputs.part import Part
 from lostmotion.simulation.runs.result_files import FORMATS
 

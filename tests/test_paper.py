@@ -14,8 +14,8 @@ import paper_equations
 from conftest import ROOT
 from html_pages import Page, charts
 from lostmotion.paper import AMPLITUDES, MODELS, constants, paper_scenario
-from lostmotion.paper.facts import Facts, facts
 from lostmotion.paper.figures import draw, figure_specs
+from lostmotion.paper.quoted_numbers import Facts, facts
 from lostmotion.paper.reproduce import WORK, reproduce
 from lostmotion.paper.runs import Results, compute, stuck_intervals
 

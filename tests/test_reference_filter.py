@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.servo.regimes import axis_of, regimes
-from lostmotion.servo.sampled import SampledLoop
+from lostmotion.servo.linear_regimes import axis_of, regimes
+from lostmotion.servo.linear_sampled_loop import LinearLoop
 from refusals import refused
 from test_c_interface import OK, library  # noqa: F401
 from test_description import Scenario
@@ -69,7 +69,7 @@ def test_the_linear_loops_have_it_before_the_outermost_loop_alone() -> None:
     frequency = np.array([1.0, 5.0, 20.0])
     z, a = np.exp(2j * math.pi * frequency * T), math.exp(-T / TAU)
     for loop, factor in (("position", (1.0 - a) / (z - a)), ("speed", 1.0)):
-        one, other = (SampledLoop(of, regimes(of)[0], loop, cut=False) for of in (with_filter, without))
+        one, other = (LinearLoop(of, regimes(of)[0], loop, cut=False) for of in (with_filter, without))
         assert one.response(frequency) == pytest.approx(factor * other.response(frequency), rel=1e-9)
 
 

@@ -13,8 +13,8 @@ from lostmotion.reports.page import render
 from lostmotion.reports.run import run_report, summary, verdict_of
 from lostmotion.reports.run_loops import loop_errors
 from lostmotion.reports.servo import servo_report
+from lostmotion.servo.linear_regimes import axis_of, regimes
 from lostmotion.servo.margins import instability
-from lostmotion.servo.regimes import axis_of, regimes
 from two_mass import two_mass
 
 MOVES = {"kind": "position", "moves": [{"to": 0.5 * math.pi}], "speed": 4.0, "acceleration": 40.0}

@@ -12,7 +12,7 @@ from lostmotion.servo.hunting.exact_slips import Slips
 from lostmotion.servo.hunting.quantised_slip_end import loudest
 from lostmotion.servo.hunting.sampled_proof import end_of_slip
 from lostmotion.servo.hunting.sampled_stuck_contact import sampled_slip
-from lostmotion.servo.regimes import axis_of
+from lostmotion.servo.linear_regimes import axis_of
 
 INERTIA, SLIDING, TICK = 0.5, 2.0, 1e-3
 K_V, K_P, K_I = 5.0, 20.0, 40.0

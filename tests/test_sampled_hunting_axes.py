@@ -9,8 +9,8 @@ import numpy as np
 
 import lostmotion as lm
 from lostmotion.servo.hunting.sampled_stuck_contact import sampled_slip
+from lostmotion.servo.linear_regimes import axis_of, regimes
 from lostmotion.servo.margins import instability
-from lostmotion.servo.regimes import axis_of, regimes
 from test_hunting_axes import geared
 
 AXES = 5  # of the test, two that do not hunt and three that do; the script takes 500

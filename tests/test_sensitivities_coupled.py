@@ -59,7 +59,7 @@ def value_of(scenario: lm.Scenario, key: str) -> float:
     return float(node)
 
 
-@pytest.mark.filterwarnings("ignore::lostmotion.inputs.doubts.ValueWarning")
+@pytest.mark.filterwarnings("ignore::lostmotion.inputs.implausible_values.ValueWarning")
 @pytest.mark.parametrize("key", KEYS)
 def test_derivatives_of_coupled_links_are_those_of_differences_of_runs(key: str) -> None:
     """Both entries off the diagonal change together; friction sticks, the elbow strikes its stop, the wheel its flanks."""

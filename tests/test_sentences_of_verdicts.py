@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 from lostmotion.sizing.axis_rules import least, with_safety
 from lostmotion.sizing.finding import Finding, within
 from lostmotion.studies.selection.nearest_misses import Miss, _rounded_up
-from lostmotion.studies.selection.ranking import Candidate
+from lostmotion.studies.selection.ranking import RankedCandidate
 from lostmotion.units.practical import ROUNDING, counted, excess, part_of_whole, share_of_limit, told_apart
 
 LIMITS = st.floats(1e-6, 1e6)
@@ -119,6 +119,6 @@ def test_a_cycle_is_longer_by_no_more_than_a_miss_needs(excess_of_factor: float)
 
 @given(share=st.floats(2e-9, 1e3))
 def test_a_miss_is_never_0_percent_over_its_limit(share: float) -> None:
-    miss = Miss(Candidate(0, "pair", ("current",), "", "", {}), {"current": share}, None)
+    miss = Miss(RankedCandidate(0, "pair", ("current",), "", "", {}), {"current": share}, None)
     (percent,) = percents(str(miss))
     assert percent > 0.0

@@ -14,17 +14,17 @@ from conftest import ROOT, lostmotion
 from html_pages import charts
 from lostmotion.control.tuning import TwoInertias, identical_damping, identical_radius, identical_real_part, symmetrical_optimum
 from lostmotion.reports.servo import servo_report
+from lostmotion.servo.linear_regimes import Axis, axis_of, regimes
+from lostmotion.servo.linear_sampled_loop import LinearLoop
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
-from lostmotion.servo.regimes import Axis, axis_of, regimes
-from lostmotion.servo.sampled import SampledLoop
 from lostmotion.servo.tuning_data import lag_sum, two_inertias
 from two_mass import C_L, J_L, J_M, A, B, T, k, two_mass
 
 
-def sampled(scenario: Any, loop: str, cut: bool) -> SampledLoop:
+def sampled(scenario: Any, loop: str, cut: bool) -> LinearLoop:
     axis = axis_of(scenario)
     (regime,) = regimes(axis)
-    return SampledLoop(axis, regime, loop, cut)
+    return LinearLoop(axis, regime, loop, cut)
 
 
 def motor_speed_over_torque() -> Any:
@@ -286,7 +286,7 @@ def test_tuning_gives_a_scenario_that_carries_the_gains(position_axis: Any) -> N
 def test_tuning_by_margins_keeps_them_and_one_of_them_exactly(position_axis: Any, least: float) -> None:
     tuned = lm.tune(position_axis, rule="margins", phase_margin="55 deg", gain_margin=least)
     axis = axis_of(tuned.scenario)
-    rows = [margins(SampledLoop(axis, r, "speed", True), SampledLoop(axis, r, "speed", False)) for r in regimes(axis)]
+    rows = [margins(LinearLoop(axis, r, "speed", True), LinearLoop(axis, r, "speed", False)) for r in regimes(axis)]
     assert all(m.stable for m in rows)
     phase, gain = min(math.degrees(m.phase_margin) for m in rows), min(m.gain_margin for m in rows)
     assert phase >= 55.0 * (1 - 1e-4)
@@ -297,7 +297,7 @@ def test_tuning_by_margins_keeps_them_and_one_of_them_exactly(position_axis: Any
 def test_a_bandwidth_takes_no_more_gain_than_it_needs(position_axis: Any) -> None:
     tuned = lm.tune(position_axis, rule="margins", bandwidth="3 Hz")
     axis = axis_of(tuned.scenario)
-    loops = [SampledLoop(axis, r, "speed", False) for r in regimes(axis)]
+    loops = [LinearLoop(axis, r, "speed", False) for r in regimes(axis)]
     found = [bandwidth_of(frequencies(loop), loop.closed_loop) for loop in loops]
     assert min(min(b.three_decibels, b.ninety_degrees) for b in found) == pytest.approx(3.0, rel=2e-4)
     assert tuned.gain < lm.tune(position_axis, rule="margins").gain

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.servo.linear_regimes import axis_of, regimes
+from lostmotion.servo.linear_sampled_loop import LinearLoop
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
-from lostmotion.servo.regimes import axis_of, regimes
-from lostmotion.servo.sampled import SampledLoop
 
 T = 125e-6
 DAMPING, STIFFNESS = 1e-3, 2000.0
@@ -43,8 +43,8 @@ def at_speed(scenario: lm.Scenario, monkeypatch: pytest.MonkeyPatch) -> tuple[An
     """The axis and its regime at the speed of its reference, the coupling twisted by the torque that it carries there."""
     speed = scenario.controllers["m"].reference.mean
     twist = DAMPING * speed / STIFFNESS
-    monkeypatch.setattr("lostmotion.servo.regimes.speed_of", lambda _: speed)
-    monkeypatch.setattr("lostmotion.servo.regimes._last", lambda _: 2.0 * twist / 1.5)
+    monkeypatch.setattr("lostmotion.servo.linear_regimes.speed_of", lambda _: speed)
+    monkeypatch.setattr("lostmotion.servo.linear_regimes._last", lambda _: 2.0 * twist / 1.5)
     whole = axis_of(scenario)
     (regime,) = regimes(whole)
     return whole, regime
@@ -58,7 +58,7 @@ def test_at_rest_both_current_loops_have_the_closed_form(saliency: dict[str, flo
     (regime,) = regimes(whole)
     x = 2.0 * math.asin(1.0 / 6.0)
     for loop in ("direct current", "current"):
-        cut, closed = (SampledLoop(whole, regime, loop, is_cut) for is_cut in (True, False))
+        cut, closed = (LinearLoop(whole, regime, loop, is_cut) for is_cut in (True, False))
         found, band = margins(cut, closed), bandwidth_of(frequencies(closed), closed.response)
         assert found.crossover == pytest.approx(x / (2.0 * math.pi * T), rel=1e-6)
         assert found.phase_margin == pytest.approx(0.5 * math.pi - 1.5 * x, rel=1e-6)
@@ -93,7 +93,7 @@ def test_the_speed_loop_answers_a_small_sine_as_the_simulator_does(
     """Of 0.05 rad/s in several hundred: what is quadratic in it is below 1e-7, as is the core's own exchange of torque and speed."""
     scenario, size = axis(speed, **more), 0.05
     whole, regime = at_speed(scenario, monkeypatch)
-    found = SampledLoop(whole, regime, "speed", False).response(frequency, feedforward=False)[0]
+    found = LinearLoop(whole, regime, "speed", False).response(frequency, feedforward=False)[0]
     wave = {"kind": "speed", "mean": speed, "amplitude": size, "frequency": frequency}
     run = lm.simulate(scenario.replace(**{"controllers.m.reference": wave}), duration=1.6, sample_interval=T / 2)
     steady = regime.winding.steady
@@ -104,7 +104,7 @@ def test_the_speed_loop_answers_a_small_sine_as_the_simulator_does(
 def test_stiffness_at_speed_is_that_of_a_run_under_a_sine_of_load_torque(monkeypatch: pytest.MonkeyPatch) -> None:
     scenario, f, size = axis(400.0, every=2), 80.0, 0.01
     whole, regime = at_speed(scenario, monkeypatch)
-    found = SampledLoop(whole, regime, "speed", False).compliance(f, "load", "load")[0]
+    found = LinearLoop(whole, regime, "speed", False).compliance(f, "load", "load")[0]
     loaded = scenario.replace(**{"shafts.load.torque": {"amplitude": size, "frequency": f}})
     run = lm.simulate(loaded, duration=1.6, sample_interval=2 * T)
     n = round(1.4 / (2 * T))
@@ -119,7 +119,7 @@ def test_a_frequency_response_is_that_of_the_linear_loop_where_it_is_small(monke
     scenario, f = axis(300.0), [20.0, 100.0]
     whole, regime = at_speed(scenario, monkeypatch)
     found = lm.frequency_response(scenario, f, 0.05)
-    expected = SampledLoop(whole, regime, "speed", False).response(f, feedforward=False)
+    expected = LinearLoop(whole, regime, "speed", False).response(f, feedforward=False)
     assert not any(found["reason"].values.ravel())
     assert found["response"].sel(output="m_measured_speed").values.ravel() == pytest.approx(expected, rel=1e-6)
     assert not {"m_copper_heat", "m_electrical_energy"} & set(found["output"].values)

@@ -11,8 +11,8 @@ import pytest
 import lostmotion as lm
 from conftest import some
 from lostmotion.servo.axis_runs import errors_of, ran
-from lostmotion.servo.hunting.at_rest import at_rest
-from lostmotion.servo.regimes import axis_of
+from lostmotion.servo.hunting.limit_cycle_causes import at_rest
+from lostmotion.servo.linear_regimes import axis_of
 from lostmotion.servo.settling import Moves, Settling, State, default_window, repeated, settling
 from two_mass import k, two_mass
 

@@ -19,7 +19,7 @@ from lostmotion.reports.study_selection import pareto_figure
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.studies.runs.chunk import scenario_of_run
 from lostmotion.studies.runs.read_table import read_table
-from lostmotion.studies.selection.ranking import NOT_RUN, Candidate, candidates, pareto_front, prices
+from lostmotion.studies.selection.ranking import NOT_RUN, RankedCandidate, candidates, pareto_front, prices
 from lostmotion.studies.study.select_table import Selection
 
 EXAMPLE = ROOT / "examples" / "select-gearbox.toml"
@@ -91,9 +91,11 @@ def test_the_command_line_shows_the_selection(selection: tuple[lm.studies.Study,
     assert {r["gearbox"] for r in rows} == set(lm.studies.load_study(EXAMPLE).vary[0].names)
 
 
-def made(*rows: tuple[str, str, float, float]) -> list[Candidate]:
+def made(*rows: tuple[str, str, float, float]) -> list[RankedCandidate]:
     return [
-        Candidate(k, name, (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()), violated, "", {"cost": cost, "speed": speed})
+        RankedCandidate(
+            k, name, (NOT_RUN,) if violated == NOT_RUN else tuple(violated.split()), violated, "", {"cost": cost, "speed": speed}
+        )
         for k, (name, violated, cost, speed) in enumerate(rows)
     ]
 

@@ -9,10 +9,10 @@ import pytest
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.servo.hunting.at_rest import at_rest, limit_cycle
-from lostmotion.servo.hunting.standstill import NOISE, Watch
+from lostmotion.servo.hunting.hunting_decision import NOISE, WatchedRun
+from lostmotion.servo.hunting.limit_cycle_causes import at_rest, limit_cycle
+from lostmotion.servo.linear_regimes import axis_of, regimes
 from lostmotion.servo.margins import instability
-from lostmotion.servo.regimes import axis_of, regimes
 from lostmotion.simulation.runs.run import run
 
 SEEDS = range(20_260_101, 20_260_101 + some(4, 2))
@@ -168,7 +168,7 @@ def test_hunting_slower_than_the_first_watch_is_found_with_its_cause() -> None:
 def test_the_time_of_the_break_away_follows_from_the_stuck_state() -> None:
     """With T dI/dt = k_p/T_i K_v e the torque of the stuck rotor goes in a straight line to the 0.04 N·m that it holds."""
     axis = axis_of(slow_hunting())
-    watch = Watch(axis.scenario, ("rotor_angle",))
+    watch = WatchedRun(axis.scenario, ("rotor_angle",))
     outlook, looks = watch.outlook(0.05)
     while looks is None or not outlook.breaks_away > 2.0:
         watch.follow(0.25)
@@ -185,7 +185,7 @@ def test_the_time_of_the_break_away_follows_from_the_stuck_state() -> None:
 
 
 def test_a_stuck_interval_that_is_extrapolated_ends_as_if_it_were_followed() -> None:
-    two = [Watch(slow_hunting(), ("rotor_angle",)) for _ in range(2)]
+    two = [WatchedRun(slow_hunting(), ("rotor_angle",)) for _ in range(2)]
     window, ends = 0.005, []
     for watch in two:
         watch.follow(10.0)

@@ -6,7 +6,7 @@ import pytest
 
 from lostmotion.reports.study_selection import _verdict
 from lostmotion.studies.runs.axis_pairs import HOLDS
-from lostmotion.studies.selection.ranking import NOT_RUN, Candidate, prices
+from lostmotion.studies.selection.ranking import NOT_RUN, RankedCandidate, prices
 from lostmotion.studies.study.drive_check_columns import NO_DATA, UNSTABLE
 from lostmotion.studies.study.select_table import Selection
 from lostmotion.verdict import Verdict
@@ -15,12 +15,12 @@ pa = pytest.importorskip("pyarrow")
 SELECT = Selection(objectives={"mass": "least"})
 
 
-def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "") -> Candidate:
+def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "") -> RankedCandidate:
     mass = {"mass": 1.0 + run}
-    return Candidate(run, f"pair {run}", violated, " ".join(violated), not_judged, mass, estimated=estimated)
+    return RankedCandidate(run, f"pair {run}", violated, " ".join(violated), not_judged, mass, estimated=estimated)
 
 
-def verdict(*ranked: Candidate) -> Verdict:
+def verdict(*ranked: RankedCandidate) -> Verdict:
     table = pa.table({"mass": [c.values["mass"] for c in ranked]})
     return _verdict(table, list(ranked), prices(list(ranked), SELECT), SELECT, [])
 

@@ -10,7 +10,8 @@ from lostmotion.model.duty import Duty, Supply
 from lostmotion.model.linear import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing import catalogue_formulas
-from lostmotion.sizing.axis_rules import axial_load, screw_mean_load, screw_rules
+from lostmotion.sizing.axis_rules import screw_rules
+from lostmotion.sizing.life import axial_load, mean_load, nominal_life, screw_mean_load
 from lostmotion.sizing.required_motion import RequiredMotion, required_motion
 from lostmotion.sizing.supply import returned, supply_rules
 from lostmotion.sizing.thermal import rms
@@ -86,7 +87,7 @@ def test_buckling_and_speeds_of_a_horizontal_screw():
 )  # fmt: skip
 def test_life_of_a_horizontal_screw(horizontal: RequiredMotion, capacity: float, lead: float, life: float, hours: float):
     """THK A-734: f_w 1.5 and 225 N; mean speeds of 400 and 267 rpm are 8 double strokes a minute on these leads."""
-    assert catalogue_formulas.nominal_life(capacity, 225.0, load_factor=1.5) == pytest.approx(life, rel=5e-3)
+    assert nominal_life(capacity, 225.0, load_factor=1.5) == pytest.approx(life, rel=5e-3)
     screw = RatedScrew(lead=lead, dynamic_capacity=capacity, load_factor=1.5)
     found = next(f for f in screw_rules(axial_load(horizontal), screw, 1e3 * 3600.0) if f.rule == "screw_life")
     assert 1e3 / found.use == pytest.approx(hours, rel=0.01)  # the mean load printed is rounded to 0.2 %, cubed
@@ -125,7 +126,7 @@ def test_a_vertical_screw():
         mounting="fixed-fixed",
     )
     found = {f.rule: f for f in screw_rules(axial_load(motion), screw, 1e3 * 3600.0)}
-    assert catalogue_formulas.nominal_life(9800.0, 492.0, load_factor=1.5) == pytest.approx(2.34e9, rel=2e-3)
+    assert nominal_life(9800.0, 492.0, load_factor=1.5) == pytest.approx(2.34e9, rel=2e-3)
     assert 1e3 / found["screw_life"].use == pytest.approx(65000.0, rel=0.01)
     assert found["screw_static"].use == pytest.approx(585.0 / 12600.0, rel=PRINTED)
     assert found["buckling"].use == pytest.approx(585.0 / 9960.0, rel=5e-3)
@@ -135,10 +136,10 @@ def test_life_of_a_screw_under_a_spectrum():
     """Rexroth R310RU3301: 304 rpm, 8757 N, 1042e6 revolutions."""
     speeds, shares = [10.0, 30.0, 100.0, 1000.0], [0.06, 0.22, 0.47, 0.25]
     assert sum(n * q for n, q in zip(speeds, shares, strict=True)) == pytest.approx(304.0, abs=0.5)
-    mean = catalogue_formulas.mean_load([50e3, 25e3, 8e3, 2e3], speeds, shares)
+    mean = mean_load([50e3, 25e3, 8e3, 2e3], speeds, shares)
     mean *= (304.2 / 304.0) ** (1.0 / 3.0)  # the example goes on with the rounded mean speed
     assert mean == pytest.approx(8757.0, abs=1.0)
-    assert catalogue_formulas.nominal_life(88.8e3, mean) == pytest.approx(1042e6, rel=1e-3)
+    assert nominal_life(88.8e3, mean) == pytest.approx(1042e6, rel=1e-3)
 
 
 def test_critical_speed_and_buckling_read_from_a_graph():

@@ -20,7 +20,7 @@ import xarray as xr
 import lostmotion as lm
 from conftest import for_all
 from lostmotion.identification.task.free_parameters import FreeParameter
-from lostmotion.inputs.doubts import ValueWarning
+from lostmotion.inputs.implausible_values import ValueWarning
 from lostmotion.inputs.part import Part
 from lostmotion.studies.study.select_table import Selection
 from public_names import PATHS, public

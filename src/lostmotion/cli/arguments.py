@@ -39,7 +39,7 @@ def as_number(text: str) -> float | None:
 
 def print_bare(what: str, text: str, unit: str | None) -> None:
     """Print a bare number of an option with the unit in which it is read; nothing of text with a unit, or of a plain number."""
-    from ..inputs.doubts import read_as
+    from ..inputs.implausible_values import read_as
 
     value = as_number(text)
     if unit and value is not None:

@@ -36,7 +36,7 @@ def reproduce(output: ReportOption = None, figures: FiguresOption = None) -> Non
 
 def _print_results() -> None:
     """The verdict of the report, without its figures."""
-    from ..paper.facts import facts
+    from ..paper.quoted_numbers import facts
     from ..paper.report import TITLE, agreement
     from ..paper.runs import WORK, compute
 

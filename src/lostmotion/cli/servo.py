@@ -261,7 +261,7 @@ def _settled(scenario: Scenario, motor: str | None, window: str) -> float:
     """The window in SI: an angle, or of a slide a distance."""
     from ..errors import InputError
     from ..inputs.validation import shown
-    from ..servo.regimes import axis_of
+    from ..servo.linear_regimes import axis_of
     from ..units.conversion import si_value
 
     axis = axis_of(scenario, motor)

@@ -71,14 +71,14 @@ def about(source: str) -> Iterator[None]:
         raise InputError(f"{in_short(Path(source))}: {error}") from None
 
 
-class Step(Protocol):
+class ProgressStep(Protocol):
     """Notifies a progress bar of one more piece of work, or of how many are done."""
 
     def __call__(self, done: int | None = None) -> None: ...
 
 
 @contextmanager
-def progress(total: int, what: str) -> Iterator[Step]:
+def progress(total: int, what: str) -> Iterator[ProgressStep]:
     """A progress bar with rate and remaining time on stderr; where that is no terminal, a line now and then."""
     if not sys.stderr.isatty():
         yield _lines(total, what)
@@ -110,7 +110,7 @@ def progress(total: int, what: str) -> Iterator[Step]:
         yield step
 
 
-def _lines(total: int, what: str) -> Step:
+def _lines(total: int, what: str) -> ProgressStep:
     """Prints a line now and then, once the work takes long."""
     begin = last = time.monotonic()
     count = 0

@@ -8,6 +8,7 @@ from .continuous import SpeedPID as SpeedPID
 from .continuous import SpeedSignal as SpeedSignal
 from .continuous import StateSpace as StateSpace
 from .continuous import as_state_space as as_state_space
+from .custom_controller import Law as Law
 from .encoder import Encoder as Encoder
 from .filters import TransferFunction as TransferFunction
 from .filters import as_filter as as_filter
@@ -15,7 +16,6 @@ from .firmware import DutyCurve as DutyCurve
 from .firmware import Firmware as Firmware
 from .inverse_model import InverseModel as InverseModel
 from .inverse_model import LoadObserver as LoadObserver
-from .law import Law as Law
 from .references import Move as Move
 from .references import SlideMove as SlideMove
 from .references import SlideReference as SlideReference

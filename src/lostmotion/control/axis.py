@@ -12,19 +12,19 @@ from typing import Any
 
 from .. import _core
 from ..errors import InputError, inside
-from ..inputs.described import Described, ReferenceBlocks
+from ..inputs.core_parameters import Described, ReferenceBlocks
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor, MotorLaw
 from ..model.signals import columns
 from ..model.train import DriveTrain
 from .continuous import ContinuousController
 from .controller import Controller
+from .custom_controller import Law
 from .encoder import Encoder
 from .filters import discrete
-from .law import Law
 from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, VoltageCommand
 from .sample_times import whole_multiple
-from .turning import turns
+from .shaft_ratio import turns
 
 BoundController = tuple[float, list[_core.Axis]]
 """shortest sample time [s], and the controllers with the numbers of their motors and shafts"""

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 from pydantic import model_validator
 
 from .. import _core
-from ..inputs.described import CameraFields, TrackerFields
+from ..inputs.core_parameters import CameraFields, TrackerFields
 from ..inputs.quantities import NotNegative, Positive, Time
 
 

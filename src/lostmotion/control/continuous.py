@@ -36,11 +36,11 @@ from ..units.conversion import Unit
 from .command import CommandSignal
 from .firmware import Firmware
 from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
-from .turning import turns
+from .shaft_ratio import turns
 
 MAX_ORDER = 8  # of a state space
 
-Row = tuple[Number, ...]
+GainRow = tuple[Number, ...]
 
 
 class PositionSignal(Signal[Angle]):

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Discriminator, Field, Tag, model_validator
 
-from ..inputs.described import ReferenceBlocks
+from ..inputs.core_parameters import ReferenceBlocks
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from ..recorded_numbers import real
 from .camera import Camera, Tracker

@@ -6,7 +6,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.described import EncoderFields
+from ..inputs.core_parameters import EncoderFields
 from ..inputs.quantities import Whole
 
 RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")

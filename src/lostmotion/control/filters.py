@@ -8,23 +8,23 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs import described
+from ..inputs import core_parameters
 from ..inputs.arguments import checked
 
 
-class LowPass(described.LowPassFields):
+class LowPass(core_parameters.LowPassFields):
     """1/(1 + s/w), or with a damping of second order, by Tustin's rule with the corner prewarped."""
 
     kind: Literal["low_pass"]
 
 
-class Notch(described.NotchFields):
+class Notch(core_parameters.NotchFields):
     """((s/w_z)^2 + 2 D_z s/w_z + 1)/((s/w_n)^2 + 2 D_n s/w_n + 1), by Tustin's rule with w_z prewarped."""
 
     kind: Literal["notch"]
 
 
-class TransferFunction(described.TransferFunctionFields):
+class TransferFunction(core_parameters.TransferFunctionFields):
     """A transfer function in z at the sample time of its loop."""
 
     kind: Literal["transfer_function"] = "transfer_function"

@@ -6,7 +6,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.described import FirmwareFields
+from ..inputs.core_parameters import FirmwareFields
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Share
 from ..reproducible import interpolate

@@ -5,7 +5,7 @@ from typing import Any, Self
 from pydantic import model_validator
 
 from ..errors import InputError
-from ..inputs.described import (
+from ..inputs.core_parameters import (
     FrictionAdaptationLawFields,
     InverseModelFields,
     LoadObserverFields,

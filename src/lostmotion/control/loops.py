@@ -4,7 +4,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ..inputs.described import (
+from ..inputs.core_parameters import (
     CurrentLoopFields,
     DifferenceFields,
     FeedforwardFields,

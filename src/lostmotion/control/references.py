@@ -9,7 +9,7 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.described import V
+from ..inputs.core_parameters import V
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Acceleration,

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from ..errors import InputError, prefixed
 from ..inputs.arguments import RecordName, checked
-from ..inputs.doubts import doubt
+from ..inputs.implausible_values import doubt
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Inertia, NotNegative, Number, Positive, Temperature, argument
 from ..inputs.schema import keys_within

@@ -15,12 +15,12 @@ import numpy as np
 
 from ..errors import InputError
 from .fit.intervals import CHI_SQUARE
-from .fit.least_squares import NORMAL, Fit, Problem, problem_of, search
+from .fit.least_squares import NORMAL, Fit, FitProblem, problem_of, search
 from .fit.log_errors import LogError, log_errors
 from .fit.saved_progress import Models
 from .prepared_log import Prepared
 from .rig.measured_motion import windows
-from .rig.residuals import Engine, Point
+from .rig.residuals import Engine, ParameterPoint
 from .rig.rig_scenario import Rig
 from .task.identification_file import Identification, free_on
 from .verdicts.identifiability import Undetermined, undetermined
@@ -55,7 +55,7 @@ class RungResult:
     """reason by log held out, where it has no run with the values of this model"""
     undetermined: list[Undetermined]
     """unidentifiable parameters of this model"""
-    minima: list[Point] = field(default_factory=list)
+    minima: list[ParameterPoint] = field(default_factory=list)
     """other minima of the cost that these logs do not tell from the one found"""
 
     @property
@@ -86,7 +86,7 @@ def begun_with(task: Identification, train: Sequence[Prepared]) -> list[Prepared
 
 
 def climb(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, notify: Notify, models: Models
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: ParameterPoint, notify: Notify, models: Models
 ) -> list[RungResult]:
     """Fit all candidate models, one after the other.
 
@@ -120,8 +120,8 @@ def climb(
 
 
 def _rung(
-    rig: Rig, engine: Engine, train: list[Prepared], rung: int, point: Point, below: Fit | None, notify: Notify
-) -> tuple[Fit, list[Point]]:
+    rig: Rig, engine: Engine, train: list[Prepared], rung: int, point: ParameterPoint, below: Fit | None, notify: Notify
+) -> tuple[Fit, list[ParameterPoint]]:
     """(fit of a candidate model, other minima), begun at the values of the model before."""
     task, entry = rig.task, rig.rungs()[rung]
     added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
@@ -157,11 +157,11 @@ def _other_minima(
     engine: Engine,
     train: list[Prepared],
     rung: int,
-    first: Point,
+    first: ParameterPoint,
     best: Fit,
     names: Sequence[str],
     notify: Notify,
-) -> tuple[Fit, list[Point]]:
+) -> tuple[Fit, list[ParameterPoint]]:
     """(best fit, points of other minima that are as good) from several values of parameters on which the motion does not depend smoothly.
 
     Nothing is tried where the residuals of the fit are the noise that the task states.
@@ -171,7 +171,7 @@ def _other_minima(
         return best, []
     others: list[Fit] = []
 
-    def starts() -> Iterator[Point]:
+    def starts() -> Iterator[ParameterPoint]:
         for k, name in enumerate(names):
             if k == 0:
                 yield grown(problem, first)
@@ -189,7 +189,7 @@ def _other_minima(
     return best, [fit.point for fit in others if _cost(problem, fit, best) - best.cost < CHI_SQUARE * scale]
 
 
-def grown(problem: Problem, start: Point) -> Point:
+def grown(problem: FitProblem, start: ParameterPoint) -> ParameterPoint:
     """Results of fits to growing first parts of the logs: there are few impacts in the first."""
     for share in PARTS:
         logs = [log.part(0, max(LEAST, round(share * len(log.time)))) for log in problem.logs]
@@ -198,7 +198,7 @@ def grown(problem: Problem, start: Point) -> Point:
     return start
 
 
-def _promising(problem: Problem, fit: Fit, name: str) -> list[float]:
+def _promising(problem: FitProblem, fit: Fit, name: str) -> list[float]:
     """Values of a parameter at which a scan, all others as found, has its lowest other minima of the cost."""
     p, value = problem.parameters[name], fit.point.values[name]
     low, high = max(p.min, value / SPAN), min(p.max, SPAN * max(value, p.step))
@@ -218,13 +218,13 @@ def _promising(problem: Problem, fit: Fit, name: str) -> list[float]:
     return [float(x) for x in grid[far[np.argsort(c[far])]][:TRIED] if x != value]
 
 
-def _cost(problem: Problem, fit: Fit, other: Fit) -> float:
+def _cost(problem: FitProblem, fit: Fit, other: Fit) -> float:
     """The cost of a fit in the units of another, so that the two can be compared: each has found deviations of its own."""
     residuals = problem.engine.residuals(problem.logs, fit.point, problem.rung)
     return problem.cost(residuals, other.deviations, fit.point, other.correlation)
 
 
-def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> Point:
+def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> ParameterPoint:
     """Fit the nuisances of a held-out log, such as its zero; the parameters stay."""
     held_out = [log for log in logs if log.held_out]
     if not rig.task.nuisance or not held_out:
@@ -236,12 +236,14 @@ def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, r
     return search(replace(problem_of(rig, engine, able, rung), parameters={}), point, iterations=10).point
 
 
-def _starts(point: Point, tried: dict[str, tuple[float, ...]]) -> Iterator[Point]:
+def _starts(point: ParameterPoint, tried: dict[str, tuple[float, ...]]) -> Iterator[ParameterPoint]:
     for values in itertools.product(*tried.values()):
         yield replace(point, values=point.values | dict(zip(tried, values, strict=True)))
 
 
-def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Point, name: str, notify: Notify) -> Fit:
+def _one(
+    rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: ParameterPoint, name: str, notify: Notify
+) -> Fit:
     """Some logs first, in windows that become longer where the task says so, then all."""
     options = rig.task.fit
     few = begun_with(rig.task, train)
@@ -256,7 +258,12 @@ def _one(rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: Poin
 
 
 def _some(
-    rig: Rig, engine: Engine, few: Sequence[Prepared], rung: int, start: Point, tell: Callable[[int, float], None]
+    rig: Rig,
+    engine: Engine,
+    few: Sequence[Prepared],
+    rung: int,
+    start: ParameterPoint,
+    tell: Callable[[int, float], None],
 ) -> Fit:
     options = rig.task.fit
     for length in options.horizon:
@@ -265,7 +272,7 @@ def _some(
     return search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
 
 
-def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: Point, notify: Notify) -> Fit:
+def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: ParameterPoint, notify: Notify) -> Fit:
     """Fit of the first candidate model to the logs with which a search begins."""
     return _some(rig, engine, few, 0, start, lambda iteration, cost: notify(rig.rungs()[0].name, iteration, cost))
 

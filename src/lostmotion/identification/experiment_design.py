@@ -14,7 +14,7 @@ from .fit.least_squares import slope_of
 from .preparation.prepare import prepared
 from .readers.log import Log
 from .result import IdentificationResult
-from .rig.residuals import Engine, Point
+from .rig.residuals import Engine, ParameterPoint
 from .task.identification_file import free_on
 from .virtual_logs import virtual_log
 
@@ -82,7 +82,7 @@ def design_experiment(
     found = []
     for plan in plans:
         log = prepared(result.task, virtual_log(rig, plan, result.values, rung=result.chosen), rig.units)
-        point = Point(result.values, {log.name: {n: p.start for n, p in result.task.nuisance.items()}})
+        point = ParameterPoint(result.values, {log.name: {n: p.start for n, p in result.task.nuisance.items()}})
         (J,) = engine.jacobians([log], point, result.chosen, free)
         slopes = np.array([slope_of(free[n], result.values[n]) for n in names])
         A = J * slopes / sigma[:, None, None]

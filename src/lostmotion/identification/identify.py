@@ -15,7 +15,7 @@ from ..inputs.quantities import Count
 from .candidate_models import RungResult, begun_with, chosen, climb, first_fit, is_rough
 from .fit.input_courses import Way, as_recorded, nearer_ways
 from .fit.intervals import Interval, bootstrap, profile, widest
-from .fit.least_squares import Fit, Problem, linearised, problem_of, search
+from .fit.least_squares import Fit, FitProblem, linearised, problem_of, search
 from .fit.saved_progress import Progress
 from .fit.start_values import Regression, regressed
 from .left_out_conditions import left_out_errors
@@ -24,7 +24,7 @@ from .preparation.recorder_pauses import split_at_pauses
 from .preparation.usable_logs import gathered
 from .prepared_log import Prepared
 from .result import IdentificationResult
-from .rig.residuals import Engine, Point, start_point
+from .rig.residuals import Engine, ParameterPoint, start_point
 from .rig.rig_runs import run_logs
 from .rig.rig_scenario import Rig
 from .task.identification_file import Identification, free_on, load_identification
@@ -165,7 +165,7 @@ class _Climbed:
     rungs: list[RungResult]
     best: int
     odd: list[OddLog]
-    agreed: Point  # values that fit the logs which agree with each other
+    agreed: ParameterPoint  # values that fit the logs which agree with each other
 
 
 def _climbed(
@@ -179,7 +179,7 @@ def _climbed(
     """
     near = before is not None and len(logs) >= MANY * (len(before.logs) - len(logs))
     rig, point, start, ways, undecided = _begun(rig, logs, threads, notify)
-    kept: dict[str, tuple[Point, list[Point]]] = {}
+    kept: dict[str, tuple[ParameterPoint, list[ParameterPoint]]] = {}
     if before is not None and near:
         kept = {rung.name: (rung.fit.point, rung.minima) for rung in before.rungs}
         rig, ways, undecided = before.engine.rig, before.ways, ()
@@ -211,7 +211,7 @@ def _turned(
         return None
     ways: dict[str, Way] = {name: rig.task.inputs[name].interpolation or "hold" for name in undecided}
 
-    def fitted(other: Rig, some: list[Prepared], point: Point) -> Fit:
+    def fitted(other: Rig, some: list[Prepared], point: ParameterPoint) -> Fit:
         return search(
             problem_of(other, Engine(other, engine.threads), some, rung), point, iterations=rig.task.fit.iterations
         )
@@ -226,7 +226,7 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
     rig, task = engine.rig, engine.rig.task
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
-    problem: Problem = problem_of(rig, engine, train, best)
+    problem: FitProblem = problem_of(rig, engine, train, best)
     residuals = engine.residuals(train, fit.point, best)
     misfit = with_shapes(problem, fit.point, residuals, misfits(problem, residuals))
     intervals, found = _intervals(problem, fit, misfit, rungs[best].minima, profiles)
@@ -254,14 +254,14 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
 
 def _begun(
     rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
-) -> tuple[Rig, Point, Regression, dict[str, str], Collection[str]]:
+) -> tuple[Rig, ParameterPoint, Regression, dict[str, str], Collection[str]]:
     """(rig with a way for each input, where the search begins, why there, words on the inputs, those that runs decide)."""
     rig, ways, undecided = as_recorded(rig, logs)
     point, start = _start(rig, logs, threads)
     train = [log for log in logs if not log.held_out]
     if undecided and train:
 
-        def fitted(rig: Rig, logs: list[Prepared], start: Point) -> Fit:
+        def fitted(rig: Rig, logs: list[Prepared], start: ParameterPoint) -> Fit:
             return first_fit(rig, Engine(rig, threads), logs, start, notify)
 
         rig, point, more = nearer_ways(rig, begun_with(rig.task, train), undecided, point, fitted)
@@ -269,7 +269,7 @@ def _begun(
     return rig, point, start, ways, undecided if train else ()
 
 
-def _start(rig: Rig, logs: list[Prepared], threads: int | None) -> tuple[Point, Regression]:
+def _start(rig: Rig, logs: list[Prepared], threads: int | None) -> tuple[ParameterPoint, Regression]:
     """Start of the lowest model, with the parameters of the others off: by regression, where the task wants it."""
     point, train = start_point(rig.task, logs), [log for log in logs if not log.held_out]
     if not rig.task.fit.regression or not train:
@@ -278,7 +278,7 @@ def _start(rig: Rig, logs: list[Prepared], threads: int | None) -> tuple[Point, 
 
 
 def _intervals(
-    problem: Problem, fit: Fit, misfit: list[Misfit], minima: list[Point], profiles: bool
+    problem: FitProblem, fit: Fit, misfit: list[Misfit], minima: list[ParameterPoint], profiles: bool
 ) -> tuple[dict[str, Interval], dict[str, list[tuple[float, float]]]]:
     """(intervals, profiles), wide enough for residuals that no noise explains, and for other minima."""
     residuals = problem.engine.residuals(problem.logs, fit.point, problem.rung)
@@ -330,7 +330,7 @@ def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:
     return found
 
 
-def _resting(problem: Problem, fit: Fit) -> list[Undetermined]:
+def _resting(problem: FitProblem, fit: Fit) -> list[Undetermined]:
     """Parameters of higher models on which the values depend and which the logs do not determine."""
     rig, rung = problem.engine.rig, problem.rung
     above = free_on(rig.task, len(rig.rungs()) - 1)

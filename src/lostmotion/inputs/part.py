@@ -107,7 +107,7 @@ class Part(BaseModel, metaclass=PartType):
             return super().model_validate_json(json_data, **options)
 
     def kept_values(self) -> dict[Any, Any]:
-        """Values that `inputs.kept.kept` keeps with this object."""
+        """Values that `inputs.cached_values.kept` keeps with this object."""
         try:
             values: dict[Any, Any] = object.__getattribute__(self, "_made")
         except AttributeError:

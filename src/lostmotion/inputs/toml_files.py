@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .doubts import doubt_all
+from .implausible_values import doubt_all
 from .limits import read_text
 
 PER_BYTE = 16  # bytes of memory for each byte of a TOML file, measured

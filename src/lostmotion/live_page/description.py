@@ -18,9 +18,9 @@ from ..simulation.scenario.units_of_keys import limit_in, unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
-from .drawn import axis_figures, drawn, stepper_figures
 from .loops import loop_views
 from .references import reference_sliders, reference_view
+from .scenario_drawing import axis_figures, drawn, stepper_figures
 
 USUAL_BACKLASH = 12.0 / ARCMIN  # to where the slider goes where there is none
 

@@ -7,7 +7,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..servo.commission import LoopSheet, loop_sheet
-from ..servo.regimes import axis_of, regimes
+from ..servo.linear_regimes import axis_of, regimes
 from ..simulation.scenario.scenario import Scenario
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs import described
+from ..inputs import core_parameters
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Length, Mass, NotNegative, Positive, Torque
@@ -16,7 +16,7 @@ from ..inputs.quantities import Angle, Length, Mass, NotNegative, Positive, Torq
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
 
 
-class Harmonic(described.HarmonicFields):
+class Harmonic(core_parameters.HarmonicFields):
     """``amplitude * sin(order * phi + phase)``, by straight lines."""
 
     kind: Literal["sine"] = "sine"
@@ -83,7 +83,7 @@ class PeriodicTorque:
         return {"torque": self.core()}
 
 
-class TorqueHarmonic(PeriodicTorque, described.TorqueHarmonicFields, Harmonic):
+class TorqueHarmonic(PeriodicTorque, core_parameters.TorqueHarmonicFields, Harmonic):
     """A torque on the shaft ``amplitude * sin(order * phi + phase)``, by straight lines: cogging, ripple, unbalance."""
 
     shaft: str
@@ -112,7 +112,7 @@ class PositionHarmonic(PeriodicTorque, Part):
         return _core.harmonic({key: getattr(self, key) for key in ("amplitude", "period", "error")})
 
 
-class ErrorHarmonic(described.ErrorHarmonicFields, Harmonic):
+class ErrorHarmonic(core_parameters.ErrorHarmonicFields, Harmonic):
     """A transmission error ``amplitude * sin(order * phi + phase)`` over the angle of the input shaft, by straight lines."""
 
 

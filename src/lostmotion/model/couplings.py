@@ -4,8 +4,8 @@ from typing import Annotated, Any, ClassVar, Literal, Self
 
 from pydantic import model_validator
 
-from ..inputs import described
-from ..inputs.described import CommandedFields
+from ..inputs import core_parameters
+from ..inputs.core_parameters import CommandedFields
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Number, Time
 from .signals import Signal
@@ -109,7 +109,7 @@ class Freewheel(BetweenShafts):
         return {}
 
 
-class TorqueLimiter(described.TorqueLimiterFields, BetweenShafts):
+class TorqueLimiter(core_parameters.TorqueLimiterFields, BetweenShafts):
     """Holds two shafts together up to `release_torque`, then slips at `slip_torque` until it engages again.
 
     It engages where it slips slower than `engaging_speed`: at once or, with `pockets`, at the next of these.
@@ -132,7 +132,7 @@ class TorqueLimiter(described.TorqueLimiterFields, BetweenShafts):
         return self
 
 
-class Ratchet(described.RatchetFields, BetweenShafts):
+class Ratchet(core_parameters.RatchetFields, BetweenShafts):
     """Drives the output forward by the teeth of a wheel; backward it runs free, and holds again at the next tooth.
 
     Examples

@@ -4,7 +4,7 @@ from typing import ClassVar, Self
 
 from pydantic import model_validator
 
-from ..inputs.described import DamperFields
+from ..inputs.core_parameters import DamperFields
 from .couplings import BetweenShafts
 from .shaft import WithDrag
 

@@ -7,8 +7,8 @@ from typing import ClassVar, Self
 from pydantic import model_validator
 
 from .. import _core
-from ..inputs.kept import kept
-from ..inputs.named import Named
+from ..inputs.cached_values import kept
+from ..inputs.named_elements import Named
 from ..inputs.part import Part
 from .gear import Gear
 from .gearbox import Gearbox

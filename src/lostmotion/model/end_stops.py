@@ -4,7 +4,7 @@ from typing import Any, Self
 
 from pydantic import model_validator
 
-from ..inputs import described
+from ..inputs import core_parameters
 
 END_STOP = "_end_stop"  # behind the name of a shaft or slide: the name of its stops in the core
 
@@ -22,7 +22,7 @@ def _check(stops: Any, unit: str) -> None:
         raise ValueError("has a damping, which is that of elastic stops; give them a stiffness, or leave it out")
 
 
-class ShaftEndStops(described.ShaftEndStopsFields):
+class ShaftEndStops(core_parameters.ShaftEndStopsFields):
     """Stops of a shaft: elastic ones with a stiffness, and damping perhaps, or rigid ones with a restitution.
 
     Examples
@@ -45,7 +45,7 @@ class ShaftEndStops(described.ShaftEndStopsFields):
         return 0.0
 
 
-class EndStops(described.EndStopsFields):
+class EndStops(core_parameters.EndStopsFields):
     """Stops of a slide: elastic ones with a stiffness, and damping perhaps, or rigid ones with a restitution.
 
     Examples

@@ -5,7 +5,7 @@ from typing import Annotated, Any, Self
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.kept import kept
+from ..inputs.cached_values import kept
 from .angle_torques import TransmissionError
 from .couplings import BetweenShafts
 from .gearbox import Gearbox, Transmission

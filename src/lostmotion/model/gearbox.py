@@ -4,8 +4,8 @@ from typing import TYPE_CHECKING, Annotated, Any, Self
 
 from pydantic import Field, field_validator, model_validator
 
-from ..inputs import described
-from ..inputs.described import TransmissionFields
+from ..inputs import core_parameters
+from ..inputs.core_parameters import TransmissionFields
 from ..inputs.part import Part
 from ..inputs.quantities import Force, Number, Positive, Speed, Time, Torque
 from ..units.practical import practical
@@ -112,7 +112,7 @@ class Transmission(TransmissionFields):
         }
 
 
-class Gearbox(described.GearboxFields, Transmission):  # type: ignore[misc]  # it needs what a transmission may leave out
+class Gearbox(core_parameters.GearboxFields, Transmission):  # type: ignore[misc]  # it needs what a transmission may leave out
     """A compliance and a loss law, each chosen freely.
 
     Examples

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
-from ..inputs import described
+from ..inputs import core_parameters
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -56,7 +56,7 @@ class StiffnessCurve(Part):
         return self
 
 
-class PitchHarmonic(described.PitchHarmonicFields, Harmonic):
+class PitchHarmonic(core_parameters.PitchHarmonicFields, Harmonic):
     """A pitch error ``amplitude * sin(order * phi + phase)`` over the angle of the input shaft, by straight lines."""
 
     def gear_error(self) -> ErrorHarmonic:

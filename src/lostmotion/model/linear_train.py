@@ -6,7 +6,7 @@ from typing import Any
 from pydantic import Field
 
 from ..errors import InputError
-from ..inputs.named import Elements, Named, nothing
+from ..inputs.named_elements import Elements, Named, nothing
 from ..inputs.validation import did_you_mean, shown
 from ..recorded_numbers import may_differ
 from .gear import Gear

@@ -9,7 +9,7 @@ from pydantic import field_validator, model_validator
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.described import MotorFields, ShaftMotorFields
+from ..inputs.core_parameters import MotorFields, ShaftMotorFields
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Current,

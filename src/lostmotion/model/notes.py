@@ -7,7 +7,7 @@ from typing import Annotated, Any
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, Field
 
-from ..inputs.named import Named
+from ..inputs.named_elements import Named
 
 WHOLE = "general"  # key of a note that is about no single key of its part
 

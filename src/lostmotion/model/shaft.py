@@ -7,7 +7,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs import described
+from ..inputs import core_parameters
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Positive, Speed, Torque
@@ -50,7 +50,7 @@ def check_friction(part: Any, force: str, unit: str) -> None:
         raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
 
 
-class FrictionCurve(described.FrictionCurveFields):
+class FrictionCurve(core_parameters.FrictionCurveFields):
     """Dry friction torque over the magnitude of the speed: straight lines through the points, constant beyond the last."""
 
     @model_validator(mode="after")
@@ -91,7 +91,7 @@ class DragCurve(Part):
         return _core.TorsionCurve(list(self.speeds[1:-1]), slopes)
 
 
-class QuadraticDrag(described.QuadraticDragFields):
+class QuadraticDrag(core_parameters.QuadraticDragFields):
     """Torque ``coefficient * w * |w|`` of a fan or a pump, by straight lines up to `max_speed`; beyond, the last goes on."""
 
     kind: Literal["quadratic"] = "quadratic"
@@ -185,7 +185,7 @@ class Stopped(Part):
     end_stops: ShaftEndStops | None = None  #: stops at both ends of the travel
 
 
-class Shaft(WithDrag, described.DryFrictionFields, Stopped, described.ShaftFields):
+class Shaft(WithDrag, core_parameters.DryFrictionFields, Stopped, core_parameters.ShaftFields):
     """A shaft of a drive train. Rotors of motors and inertias of gears on it are added to it.
 
     Examples
@@ -213,4 +213,4 @@ class Shaft(WithDrag, described.DryFrictionFields, Stopped, described.ShaftField
 
     def friction(self) -> dict[str, Any]:
         """Dry friction by its fields in the core: torque and breakaway_torque [N·m], speeds [rad/s] and torques of a curve."""
-        return _core.dry_friction(self.fields_of(described.DryFrictionFields))
+        return _core.dry_friction(self.fields_of(core_parameters.DryFrictionFields))

@@ -14,8 +14,8 @@ import numpy as np
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs import described
-from ..inputs.described import V
+from ..inputs import core_parameters
+from ..inputs.core_parameters import V
 from ..inputs.part import Part
 from ..inputs.quantities import (
     Angle,
@@ -41,7 +41,7 @@ Breakpoint = tuple[float, ...]
 """from a time [s] on: value, slope and, of what is not made of straight lines, the second and third derivative"""
 
 
-class Sine(described.SineFields[V], Generic[V]):
+class Sine(core_parameters.SineFields[V], Generic[V]):
     """``amplitude * sin(2 pi frequency t + phase)``."""
 
 
@@ -326,7 +326,7 @@ class GivenSpeed(Signal[V], Generic[V]):
         return AccelerationSignal(speed=self)  # type: ignore[arg-type]
 
 
-class SpeedSignal(GivenSpeed[Speed]):
+class GivenSpeedSignal(GivenSpeed[Speed]):
     """A speed [rad/s] over time: the sum of all that is given, without jumps."""
 
 
@@ -339,7 +339,7 @@ class SlideSpeedSignal(GivenSpeed[LinearSpeed]):
 class AccelerationSignal(Signal[Number]):
     """The time derivative of a speed."""
 
-    speed: SpeedSignal | SlideSpeedSignal
+    speed: GivenSpeedSignal | SlideSpeedSignal
 
     def sine_list(self) -> list[tuple[float, float, float]]:
         return [(2.0 * math.pi * f * a, f, phase + 0.5 * math.pi) for a, f, phase in self.speed.sine_list()]

@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import model_validator
 
-from ..inputs import described
+from ..inputs import core_parameters
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Limit, Mass, NotNegative
 from ..reproducible import sin
@@ -15,7 +15,7 @@ from .end_stops import EndStops
 from .shaft import FrictionCurve, Shaft, check_friction, check_points
 
 
-class ForceCurve(described.ForceCurveFields):
+class ForceCurve(core_parameters.ForceCurveFields):
     """Dry friction force over the magnitude of the speed: straight lines through the points, constant beyond the last."""
 
     @model_validator(mode="after")
@@ -34,7 +34,7 @@ class Movable(Part):
     end_stops: EndStops | None = None  #: stops at both ends of the travel
 
 
-class Slide(described.SlideFrictionFields, Movable):
+class Slide(core_parameters.SlideFrictionFields, Movable):
     """A mass that moves along a straight line: a table, a carriage, a ram. Masses of linear motors on it are added.
 
     Examples

@@ -5,7 +5,7 @@ from typing import Annotated, Any
 
 from pydantic import Field
 
-from ..inputs.described import SpringFields
+from ..inputs.core_parameters import SpringFields
 from .torsion import LinearStiffness, TorsionCurve
 
 

@@ -8,7 +8,7 @@ from pydantic import model_validator
 from .. import _core
 from ..errors import InputError
 from ..inputs.breakpoints import check_apart
-from ..inputs.described import TorsionCurveFields
+from ..inputs.core_parameters import TorsionCurveFields
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Share, Stiffness, UpToOne, argument
 

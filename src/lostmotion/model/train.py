@@ -7,7 +7,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.named import Elements, nothing
+from ..inputs.named_elements import Elements, nothing
 from ..inputs.part import Part
 from ..inputs.validation import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity

@@ -1,7 +1,7 @@
-from .actuated import Actuated as Actuated
-from .actuated import ActuatedSnapshot as ActuatedSnapshot
-from .actuated import ActuatedState as ActuatedState
 from .attaching import attach as attach
+from .driven_robot import Actuated as Actuated
+from .driven_robot import ActuatedSnapshot as ActuatedSnapshot
+from .driven_robot import ActuatedState as ActuatedState
 from .mjcf import JointActuator as JointActuator
 from .mjcf import from_mjcf as from_mjcf
 from .plugin import load_plugin as load_plugin

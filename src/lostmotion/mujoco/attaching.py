@@ -21,7 +21,7 @@ from ..model.train import DriveTrain
 from ..simulation.runs.loading import load
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.shipped_scenarios import shipped_scenarios
-from .actuated import MAX_SUBSTEPS, Actuated
+from .driven_robot import MAX_SUBSTEPS, Actuated
 from .joints import acts, compiled, joint_id
 from .mjcf import JointActuator
 from .overlaps import clear, without_weight

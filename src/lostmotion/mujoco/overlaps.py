@@ -7,7 +7,7 @@ import math
 from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from ..inputs.named import Named
+from ..inputs.named_elements import Named
 from ..model.angle_torques import PeriodicTorque
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import output_of

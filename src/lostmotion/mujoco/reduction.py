@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.named import Named
+from ..inputs.named_elements import Named
 from ..inputs.quantities import Angle, Frequency, Torque
 from ..inputs.validation import shown
 from ..model.drive import Drive

@@ -8,8 +8,8 @@ from ..reports.page import cards, document, verdict
 from ..reports.pages import render_page
 from ..reports.panels import Chart, scientific
 from .drive import AMPLITUDES, MODELS, Constant
-from .facts import Facts
 from .figures import FigureSpec, charts_of
+from .quoted_numbers import Facts
 from .runs import FREQUENCIES
 
 TITLE = "Reproduction of “Simplified dynamic model of the transmission”"

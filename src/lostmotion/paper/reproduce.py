@@ -9,8 +9,8 @@ from ..reports.pages import table_csv, write_text
 from ..reports.pictures import save, side_by_side
 from . import runs
 from .drive import Constant, constants
-from .facts import facts
 from .figures import FIGURES, FigureSpec, draw, figure_csv, figure_specs
+from .quoted_numbers import facts
 from .report import render
 
 WORK = runs.WORK + FIGURES  # units of work for the progress bar

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument

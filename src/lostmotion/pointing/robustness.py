@@ -20,10 +20,10 @@ WEAR = (0.5, 1.0, 2.0, 5.0)  # [arcmin]
 AXIAL_WEAR = (1.0, 2.0, 5.0, 10.0)  # [µm]
 SPEED_FACTORS = (0.25, 0.5, 1.5, 2.0)
 
-Change = Callable[[Tables], None]
+TableChange = Callable[[Tables], None]
 
 
-def scaled_losses(factor: float) -> Change:
+def scaled_losses(factor: float) -> TableChange:
     """The losses that the controllers know, times a factor."""
 
     def change(data: Tables) -> None:
@@ -35,7 +35,7 @@ def scaled_losses(factor: float) -> Change:
     return change
 
 
-def warmer(difference: float) -> Change:
+def warmer(difference: float) -> TableChange:
     """Dry and viscous friction and losses of gears by exp(-0.015 difference), windings of DC motors and their magnets; the controllers do not know of it."""
     lubricant = math.exp(LUBRICANT * difference)
 
@@ -88,7 +88,7 @@ def _scaled(losses: Tables, factor: float) -> Tables:
     return losses
 
 
-def worn(arcmin: float) -> Change:
+def worn(arcmin: float) -> TableChange:
     """Gears with a torsion curve get so much more backlash."""
     gap = math.radians(arcmin / 60.0)
 
@@ -106,7 +106,7 @@ def worn(arcmin: float) -> Change:
     return change
 
 
-def worn_axially(micrometres: float) -> Change:
+def worn_axially(micrometres: float) -> TableChange:
     """Screws, racks and belts with a stiffness, or with flanks that strike, get so much more backlash."""
 
     def change(data: Tables) -> None:
@@ -117,7 +117,7 @@ def worn_axially(micrometres: float) -> Change:
     return change
 
 
-def faster(factor: float) -> Change:
+def faster(factor: float) -> TableChange:
     """All targets at so many times their speed; each axis begins on its reference."""
 
     def change(data: Tables) -> None:
@@ -132,7 +132,7 @@ def faster(factor: float) -> Change:
     return change
 
 
-ROBUSTNESS: dict[str, Change] = {
+ROBUSTNESS: dict[str, TableChange] = {
     **{f"losses in the controller x {factor:g}": scaled_losses(factor) for factor in MAP_FACTORS},
     **{f"{difference:+g} K": warmer(difference) for difference in TEMPERATURES},
     **{f"wear: {arcmin:g} arcmin more backlash": worn(arcmin) for arcmin in WEAR},
@@ -140,5 +140,5 @@ ROBUSTNESS: dict[str, Change] = {
 }
 """what axes may become, or their controllers take them for"""
 
-SPEEDS: dict[float, Change] = {factor: faster(factor) for factor in SPEED_FACTORS}
+SPEEDS: dict[float, TableChange] = {factor: faster(factor) for factor in SPEED_FACTORS}
 """by the factor on the speed of the targets"""

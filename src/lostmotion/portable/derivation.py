@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.named import Named
+from ..inputs.named_elements import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Limit
 from ..recorded_numbers import Tape

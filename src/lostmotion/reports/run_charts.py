@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.validation import shown
-from ..live_page.drawn import axis_figures
+from ..live_page.scenario_drawing import axis_figures
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
 from ..simulation.runs.results import energy_of, scenario_of

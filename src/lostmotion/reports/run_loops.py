@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError
-from ..servo.hunting.standstill import moving_input, rises_of
+from ..servo.hunting.hunting_decision import moving_input, rises_of
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import practical
@@ -151,8 +151,8 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
 
 def _pole(scenario: Scenario, motor: str) -> str:
     """Pole outside the unit circle of an axis in one of its regimes; empty where none is found."""
+    from ..servo.linear_regimes import axis_of
     from ..servo.margins import unstable_pole
-    from ..servo.regimes import axis_of
 
     try:
         return unstable_pole(axis_of(scenario, motor))

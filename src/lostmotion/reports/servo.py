@@ -10,7 +10,7 @@ import numpy as np
 
 from ..servo.axis_runs import StepResponse
 from ..servo.commission import TRUE, LoopSheet, ServoReport, decibels
-from ..servo.hunting.at_rest import LimitCycle
+from ..servo.hunting.limit_cycle_causes import LimitCycle
 from ..units.practical import charted
 from .certificate import certificate_parts
 from .looks import FAINT, look

@@ -12,7 +12,7 @@ from ..sizing.axis_task.mass_and_price import CHOICE
 from ..studies.runs.axis_pairs import HOLDS
 from ..studies.runs.read_table import labelled, unit_of
 from ..studies.selection.nearest_misses import Lacking, Miss, misses, not_judged, rules_not_judged
-from ..studies.selection.ranking import NOT_RUN, Candidate, Price, candidates, pareto_front, prices
+from ..studies.selection.ranking import NOT_RUN, Price, RankedCandidate, candidates, pareto_front, prices
 from ..studies.study.drive_check_columns import ESTIMATED, NO_DATA
 from ..studies.study.select_table import TASK_SHARES, USE, Selection
 from ..studies.study.study import Study
@@ -97,7 +97,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
 
 
 def _verdict(
-    table: pa.Table, ranked: list[Candidate], costs: list[Price], select: Selection, near: list[Miss]
+    table: pa.Table, ranked: list[RankedCandidate], costs: list[Price], select: Selection, near: list[Miss]
 ) -> Verdict:
     """Whether a candidate fits.
 
@@ -132,7 +132,7 @@ def _verdict(
     return Verdict.of(points, lines)
 
 
-def _reservations(best: Candidate, fitting: list[Candidate]) -> list[str]:
+def _reservations(best: RankedCandidate, fitting: list[RankedCandidate]) -> list[str]:
     """Open points of the best candidate that fits."""
     never = set.intersection(*(set(c.not_judged.split()) for c in fitting))
     rules = best.not_judged.split()
@@ -145,7 +145,9 @@ def _reservations(best: Candidate, fitting: list[Candidate]) -> list[str]:
     return out
 
 
-def _ranking_tables(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[Table]:
+def _ranking_tables(
+    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
+) -> list[Table]:
     fitting = [c for c in ranked if c.fits][:MAX_ROWS]
     if not fitting:
         return []
@@ -186,18 +188,18 @@ def _objectives(table: pa.Table, select: Selection) -> tuple[list[str], list[flo
     return titles, factors
 
 
-def _estimated(candidate: Candidate) -> str:
+def _estimated(candidate: RankedCandidate) -> str:
     text = candidate.estimated
     return text if text.startswith("holds") else f"is {text}"
 
 
-def _in_short(candidate: Candidate) -> str:
+def _in_short(candidate: RankedCandidate) -> str:
     """The same, of those that fit: at the ends of the range of the kind."""
     holds = candidate.estimated == HOLDS
     return f"losses estimated, the verdict {'holds' if holds else _estimated(candidate)}"
 
 
-def _why(candidate: Candidate) -> str:
+def _why(candidate: RankedCandidate) -> str:
     return (
         f"{candidate.why} (losses estimated, the verdict {_estimated(candidate)})"
         if candidate.estimated
@@ -230,7 +232,7 @@ def _costs_table(table: pa.Table, costs: list[Price], objective: str) -> Table:
     return Table("What each limit costs", header, rows)
 
 
-def _misfit_tables(ranked: list[Candidate]) -> list[Table]:
+def _misfit_tables(ranked: list[RankedCandidate]) -> list[Table]:
     out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
     if not out:
         return []
@@ -240,11 +242,13 @@ def _misfit_tables(ranked: list[Candidate]) -> list[Table]:
     ]
 
 
-def pareto_panel(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Panel:
+def pareto_panel(
+    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
+) -> Panel:
     """The first two objectives of all runs: those that fit, those that do not, and the front of those that fit."""
     x, y = list(select.objectives)[:2]
 
-    def curve(label: str, found: list[Candidate], style: dict[str, Any]) -> Curve:
+    def curve(label: str, found: list[RankedCandidate], style: dict[str, Any]) -> Curve:
         across, along = (np.array([c.values[name] for c in found]) for name in (x, y))
         return Curve(label, across, along, style, names=tuple(c.name for c in found))
 
@@ -262,20 +266,22 @@ def pareto_panel(table: pa.Table, ranked: list[Candidate], front: list[Candidate
     return Panel("Objectives of all candidates", label[0], label[1], tuple(c for c in curves if len(c.x)))
 
 
-def _in_order(front: list[Candidate], select: Selection) -> list[Candidate]:
+def _in_order(front: list[RankedCandidate], select: Selection) -> list[RankedCandidate]:
     """The Pareto front along its first objective, in which its points have their numbers."""
     first = next(iter(select.objectives))
     return sorted(front, key=lambda c: c.values[first])
 
 
-def pareto_figure(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> Figure:
+def pareto_figure(
+    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
+) -> Figure:
     """The picture of `pareto_panel`."""
     from . import plots
 
     return plots.draw([pareto_panel(table, ranked, front, select)], 1, (6.4, 4.4))
 
 
-def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front: list[Candidate]) -> str:
+def _selection_csv(table: pa.Table, study: Study, ranked: list[RankedCandidate], front: list[RankedCandidate]) -> str:
     """One row a run: rank, what varies, whether and why it fits, and all its numbers."""
     uses = [f"{USE}{rule}" for rule in TASK_SHARES if f"{USE}{rule}" in table.column_names]
     names = [*(v.title for v in study.vary), *study.kept_units, *uses]
@@ -290,7 +296,9 @@ def _selection_csv(table: pa.Table, study: Study, ranked: list[Candidate], front
     return table_csv([*header, *(labelled(table, name) for name in names)], rows)
 
 
-def _ranking(table: pa.Table, ranked: list[Candidate], front: list[Candidate], select: Selection) -> list[str]:
+def _ranking(
+    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
+) -> list[str]:
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
     fit = "fits" if len(fitting) == 1 else "fit"
@@ -375,7 +383,7 @@ def _unknown_tables(groups: list[Lacking], title: str) -> list[Table]:
     return [Table(title, ("candidates", "such as", "what is missing"), rows)]
 
 
-def _misfits(ranked: list[Candidate]) -> list[str]:
+def _misfits(ranked: list[RankedCandidate]) -> list[str]:
     out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
     lines = ["Why the others do not fit:"] if out else []
     lines += [f"  {c.name}: {_why(c)}" for c in out[:MAX_LINES]]

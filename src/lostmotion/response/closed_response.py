@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
-from ..control.law import Law
+from ..control.custom_controller import Law
 from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.variables_of_trains import signals_of

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control.references import PositionReference, SlideReference
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time

@@ -12,12 +12,12 @@ import numpy as np
 
 from .. import _core
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario
+from .linear_regimes import Axis, speed_of
 from .margins import unstable_pole
-from .regimes import Axis, speed_of
 from .tuning_data import inertias
 
 if TYPE_CHECKING:

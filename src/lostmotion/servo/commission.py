@@ -11,19 +11,19 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.doubts import doubt_window
+from ..inputs.implausible_values import doubt_window
 from ..inputs.validation import shown
 from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_value
 from ..units.practical import practical
 from ..verdict import Point, State, Verdict
 from .axis_runs import STEPPED, Following, StepResponse, following, step_response
-from .hunting.at_rest import LimitCycle, limit_cycle
 from .hunting.certificate import HuntingCertificate, certified, certified_in_words
-from .hunting.standstill import moving_input
+from .hunting.hunting_decision import moving_input
+from .hunting.limit_cycle_causes import LimitCycle, limit_cycle
+from .linear_regimes import Axis, Regime, axis_of, regimes
+from .linear_sampled_loop import LinearLoop
 from .margins import Bandwidth, Instability, Margins, bandwidth_of, frequencies, instability, margins
-from .regimes import Axis, Regime, axis_of, regimes
-from .sampled import SampledLoop
 from .settling import Moves, Settling, default_window, repeated, settling
 
 
@@ -439,7 +439,7 @@ def work(scenario: Scenario, motor: str | None = None) -> int:
 
 def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
     """Report of one loop in one regime."""
-    cut, closed = (SampledLoop(axis, regime, loop, is_cut) for is_cut in (True, False))
+    cut, closed = (LinearLoop(axis, regime, loop, is_cut) for is_cut in (True, False))
     f = frequencies(cut, closed)
     fed = None
     c = axis.controller
@@ -466,7 +466,7 @@ def loop_sheet(axis: Axis, regime: Regime, loop: str) -> LoopSheet:
 
 
 def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
-    closed = SampledLoop(axis, regime, axis.loops[-1], False)
+    closed = LinearLoop(axis, regime, axis.loops[-1], False)
     f = frequencies(closed)
     with np.errstate(divide="ignore"):  # a shaft that sticks is infinitely stiff
         values = 1.0 / np.abs(closed.compliance(f, axis.shaft, axis.shaft))

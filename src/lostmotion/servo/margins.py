@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError, MissingLibraryError
-from .regimes import Axis, Regime, regimes
-from .sampled import SampledLoop
+from .linear_regimes import Axis, Regime, regimes
+from .linear_sampled_loop import LinearLoop
 
 Response = Callable[[Any], np.ndarray]
 LOWEST, POINTS = 1e-4, 500  # of the frequencies below half the sampling frequency
@@ -84,7 +84,7 @@ def instability(axis: Axis, regime: Regime) -> Instability | None:
     """Unstable pole with all loops of an axis closed; None if there is none."""
     found = None
     for loop in reversed(axis.loops):
-        closed = SampledLoop(axis, regime, loop, False)
+        closed = LinearLoop(axis, regime, loop, False)
         values = np.linalg.eigvals(closed.transition)
         pole = complex(values[np.argmax(np.abs(values))])
         if abs(pole) < STABLE:
@@ -105,7 +105,7 @@ def unstable_pole(axis: Axis) -> str:
     return next((str(pole) for pole in found if pole is not None), "")
 
 
-def frequencies(*loops: SampledLoop) -> np.ndarray:
+def frequencies(*loops: LinearLoop) -> np.ndarray:
     """Frequencies [Hz] that show all of some loops: even on a logarithmic scale, and dense about each eigenvalue."""
     highest = min(0.5 / loop.sample_time for loop in loops)
     out = [np.geomspace(LOWEST * highest, highest, POINTS, endpoint=False)]
@@ -132,7 +132,7 @@ def roots(curve: np.ndarray, f: np.ndarray, exact: Callable[[float], float], fal
     return out
 
 
-def margins(cut: SampledLoop, closed: SampledLoop) -> Margins:
+def margins(cut: LinearLoop, closed: LinearLoop) -> Margins:
     """Margins of a loop, cut and closed."""
     from scipy.optimize import minimize_scalar
 

@@ -12,9 +12,9 @@ import numpy as np
 from ..control.references import MovesReference
 from ..response.closed_response import frame_of
 from .axis_runs import changed, errors_of, first_size, ran, settled
-from .hunting.at_rest import AtRest, watched_at_least
-from .hunting.standstill import moving_input, rises_of
-from .regimes import Axis
+from .hunting.hunting_decision import moving_input, rises_of
+from .hunting.limit_cycle_causes import AtRest, watched_at_least
+from .linear_regimes import Axis
 
 SAMPLES = 20_000  # of one cycle of the moves
 MOST = 400_000  # of a run

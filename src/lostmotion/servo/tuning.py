@@ -28,9 +28,9 @@ from ..inputs.validation import did_you_mean, shown
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import counted
 from .axis_runs import with_controller
+from .linear_regimes import Axis, Regime, axis_of, regimes
+from .linear_sampled_loop import LinearLoop
 from .margins import STABLE, bandwidth_of, frequencies, margins
-from .regimes import Axis, Regime, axis_of, regimes
-from .sampled import SampledLoop
 from .tuning_data import frictions, inertias, lag_sum, two_inertias
 from .tuning_result import Amperes, Tuning, aligned, conventions, differences, load_untuned
 
@@ -395,8 +395,8 @@ def _judge(axis: Axis, points: list[Regime], goal: str, peak: float) -> tuple[fl
     return (math.log(least) if least > 0.0 else -50.0), min(spare)
 
 
-def _loops(axis: Axis, regime: Regime, loop: str) -> tuple[SampledLoop, SampledLoop]:
-    return SampledLoop(axis, regime, loop, True), SampledLoop(axis, regime, loop, False)
+def _loops(axis: Axis, regime: Regime, loop: str) -> tuple[LinearLoop, LinearLoop]:
+    return LinearLoop(axis, regime, loop, True), LinearLoop(axis, regime, loop, False)
 
 
 def _lowest_bandwidth(axis: Axis, loop: str) -> float:
@@ -406,7 +406,7 @@ def _lowest_bandwidth(axis: Axis, loop: str) -> float:
     """
     found = []
     for regime in regimes(axis):
-        closed = SampledLoop(axis, regime, loop, False)
+        closed = LinearLoop(axis, regime, loop, False)
         if np.abs(np.linalg.eigvals(closed.transition)).max() >= STABLE:
             raise InputError(
                 f"rule: its gains are unstable in the regime {regime.name}, where the exact sampled loop has delays and compliance that "

@@ -9,14 +9,14 @@ import numpy as np
 from ..control.controller import Controller
 from ..control.filters import discrete
 from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurrent
+from ..control.shaft_ratio import turns
 from ..control.tuning import TwoInertias
-from ..control.turning import turns
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.losses import LossMap
 from ..model.torsion import Rigid
-from .regimes import Axis, speed_of
+from .linear_regimes import Axis, speed_of
 
 
 def inertias(axis: Axis, beyond: str | None = None) -> tuple[float, float]:

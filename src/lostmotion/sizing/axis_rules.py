@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
@@ -18,23 +18,12 @@ from ..model.motor import Motor
 from ..model.rack_and_belt import RatedBelt, RatedRack
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
 from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, widths, working_tension
-from .catalogue_formulas import (
-    belt_force,
-    buckling_force,
-    compression_force,
-    critical_speed,
-    dn_speed,
-    gear_life,
-    mean_load,
-    nominal_life,
-    tooth_forces,
-)
-from .duty_cycle import integral
+from .catalogue_formulas import belt_force, buckling_force, compression_force, critical_speed, dn_speed, tooth_forces
 from .finding import Finding, Judgement, within
+from .life import HOUR, AxialLoad, axial_load, life_of_gearbox, screw_life
 from .required_motion import InputDemand, RequiredMotion
 from .stages import Stage
 
-HOUR = 3600.0
 BRAKE = "torque that the holding brake carries"
 SLIDE_BRAKE = "force that the brake of the slide carries"
 STATIC = "static capacity of the screw"
@@ -64,21 +53,10 @@ def against(rule: str, what: str, value: float, limit: float | None, unit: str, 
 
 
 def gearbox_life(demand: InputDemand, wanted: float) -> Finding:
-    """L10h of a gearbox in its cycle, L (n_r/n_m) (T_r/T_m)^p with the mean of exponent p, against the wanted life [s].
-
-    Source: `formulas.gear_life`.
-    """
-    what, g, m = "life of the gearbox, L10h", demand.gearbox, demand.motion
-    if g.limits is None or g.limits.rated_life is None:
+    """L10h of a gearbox in its cycle against the wanted life [s]."""
+    what, life = "life of the gearbox, L10h", life_of_gearbox(demand)
+    if life is None:
         return missing("gearbox_life", what, "gearbox.limits.rated_life")
-    p = g.limits.life_exponent
-    steps, speed = np.diff(m.time), np.abs(demand.speed)
-    mean_speed = integral(m.time, speed) / m.cycle
-    turned = 0.5 * (speed[1:] * steps + speed[:-1] * steps)
-    torque = np.abs(m.torque) ** p
-    work = float(np.sum(0.5 * (torque[1:] + torque[:-1]) * turned))
-    mean_torque = (work / float(turned.sum())) ** (1.0 / p) if work > 0.0 else 0.0
-    life = gear_life(g.limits.rated_life, g.rated_input_speed, g.rated_output_torque, mean_speed, mean_torque, p)
     return least("gearbox_life", what, life / HOUR, wanted / HOUR, "h", "wanted life")
 
 
@@ -196,46 +174,8 @@ def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None)
     return rack_rules(peak, stage)
 
 
-@dataclass(frozen=True)
-class AxialLoad:
-    """Loads of a screw over one cycle."""
-
-    time: np.ndarray  # [s]
-    speed: np.ndarray  # speed of the slide [m/s]
-    force: np.ndarray  # [N]
-    cycle: float  # [s]
-
-
-def axial_load(motion: RequiredMotion) -> AxialLoad:
-    """The load of the screw behind a motion."""
-    return AxialLoad(motion.time, motion.speed, motion.torque, motion.cycle)
-
-
-def screw_mean_load(load: AxialLoad) -> float:
-    """Cubic mean of the axial load over the travel in its direction [N]: of both directions the larger, each over all of the travel.
-
-    The balls carry one flank at a time. Source: THK general catalogue, A-734; ISO 3408-5.
-    """
-    steps = np.diff(load.time)
-    speed = 0.5 * (np.abs(load.speed[1:]) + np.abs(load.speed[:-1]))
-    force = 0.5 * (load.force[1:] + load.force[:-1])
-    if not speed.any():
-        return 0.0
-    both = (np.maximum(sign * force, 0.0).tolist() for sign in (1.0, -1.0))
-    return max(mean_load(forces, speed.tolist(), steps.tolist()) for forces in both)
-
-
-def screw_life(load: AxialLoad, screw: RatedScrew) -> float | None:
-    """L10h of a screw in its cycle [s]: of the cubic mean load over the turns; None without its dynamic capacity."""
-    if screw.dynamic_capacity is None:
-        return None
-    revolutions = nominal_life(screw.dynamic_capacity, screw_mean_load(load), 3.0, screw.load_factor)
-    turns = integral(load.time, np.abs(load.speed)) / screw.travel()
-    return math.inf if turns == 0.0 else revolutions / turns * load.cycle
-
-
 def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *, key: str = "screw") -> list[Finding]:
-    """Life, static load, buckling, bending speed and ball speed of a screw. Sources: `formulas` and `TASK_RULES`.
+    """Life, static load, buckling, bending speed and ball speed of a screw. Sources: `catalogue_formulas` and `TASK_RULES`.
 
     wanted_life: [s]; None: the life is not judged.
     key: table of the screw, for what is missing.

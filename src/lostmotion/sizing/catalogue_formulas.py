@@ -28,25 +28,9 @@ BUCKLING_SAFETY = 0.5  # of Euler's load that is permitted: THK, Rexroth and HIW
 CRITICAL_SAFETY = 0.8  # of the first bending speed that is permitted: THK, Rexroth and HIWIN alike
 TEETH_IN_MESH = 12  # that carry at most
 
-MILLION = 1e6  # revolutions, to which dynamic capacities belong
 SEA_LEVEL = 1000.0  # [m], up to which ratings hold
 HEIGHT = 1e4  # [m]: 1 % of the torque to each 100 m
 WARM = 40.0  # [degC], up to which ratings of servo motors hold
-
-
-def mean_load(loads: Sequence[float], speeds: Sequence[float], times: Sequence[float], exponent: float = 3.0) -> float:
-    """Equivalent load of a spectrum: (sum F^p n t / sum n t)^(1/p).
-
-    Source: ISO 3408-5 and Rexroth R310RU3301 for screws (p = 3); Harmonic Drive, CSF & CSG catalogue, for gears (p = 3).
-
-    Examples
-    --------
-    >>> round(mean_load([50e3, 25e3, 8e3, 2e3], [10, 30, 100, 1000], [6, 22, 47, 25]), -1)  # Rexroth prints 8757 N
-    8760.0
-    """
-    turned = [n * t for n, t in zip(speeds, times, strict=True)]
-    work = sum(w * abs(F) ** exponent for F, w in zip(loads, turned, strict=True))
-    return (work / sum(turned)) ** (1.0 / exponent) if work > 0.0 else 0.0
 
 
 def rms(values: Sequence[float], times: Sequence[float]) -> float:
@@ -60,39 +44,6 @@ def rms(values: Sequence[float], times: Sequence[float]) -> float:
     1306
     """
     return math.sqrt(sum(x * x * t for x, t in zip(values, times, strict=True)) / sum(times))
-
-
-def nominal_life(capacity: float, load: float, exponent: float = 3.0, load_factor: float = 1.0) -> float:
-    """L10 in revolutions of a rolling contact: 1e6 (C/(f_w F))^p.
-
-    Source: ISO 281 and ISO 3408-5; p = 3 for balls, 10/3 for rollers. THK's load factor f_w: 1.2 to 1.5 for normal motion.
-
-    Examples
-    --------
-    >>> f"{nominal_life(5400, 225, load_factor=1.5):.3g}"
-    '4.1e+09'
-    """
-    if load <= 0.0:
-        return math.inf
-    return float(MILLION * (capacity / (load_factor * load)) ** exponent)
-
-
-def gear_life(
-    rated_life: float, rated_speed: float, rated_torque: float, speed: float, torque: float, exponent: float = 3.0
-) -> float:
-    """L10h of a gear from its rated point: L (n_r/n_m) (T_r/T_m)^p.
-
-    Source: Harmonic Drive, CSF & CSG catalogue, life of the wave generator (p = 3); ISO 281 for bearings of rollers
-    (p = 10/3), as manufacturers of planetary and cycloidal gears use it.
-
-    Examples
-    --------
-    >>> gear_life(7000.0, 2000.0, 100.0, 1000.0, 50.0)
-    112000.0
-    """
-    if speed <= 0.0 or torque <= 0.0:
-        return math.inf
-    return float(rated_life * rated_speed / speed * (rated_torque / torque) ** exponent)
 
 
 def buckling_force(core_diameter: float, length: float, mounting: str, modulus: float = ELASTIC_MODULUS) -> float:

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..inputs.arguments import checked
 from ..model.linear import RatedScrew
 from ..model.losses import LossMap
@@ -16,10 +16,11 @@ from ..simulation.runs.run import run
 from ..simulation.scenario.one_axis import OneAxis
 from ..simulation.scenario.requirements import need_no_impacts
 from ..simulation.scenario.scenario import Scenario
-from .axis_rules import HOUR, AxialLoad, belt_rules, missing, rack_rules, screw_life, screw_rules
+from .axis_rules import belt_rules, missing, rack_rules, screw_rules
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map
+from .life import HOUR, AxialLoad, screw_life
 from .motion_check import resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes

@@ -7,8 +7,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..control.turning import turns
-from ..inputs.named import Named
+from ..control.shaft_ratio import turns
+from ..inputs.named_elements import Named
 from ..model.motor import ShaftMotor
 from ..model.signals import ForceSignal, Ramp, TorqueSignal
 from ..model.train import DriveTrain

@@ -10,10 +10,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control.command import CommandSignal, Stepping
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.named import Named
+from ..inputs.named_elements import Named
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import ShaftMotor
 from ..model.signals import TorqueSignal

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..model.gears_in_series import DIRECT
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.stuck_contacts import smallest_commands

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..control.references import MovesReference
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number

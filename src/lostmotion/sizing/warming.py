@@ -20,7 +20,7 @@ from ..data_sheets.loss_data import Lubricant
 from ..data_sheets.loss_map_builder import VISCOSITY_EXPONENT
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.doubts import trusted
+from ..inputs.implausible_values import trusted
 from ..inputs.quantities import Number, Temperature, Time
 from ..inputs.validation import did_you_mean
 from ..model.gearbox import Transmission

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..prepared_log import Prepared
 from ..rig.measured_motion_input import GIVEN_SPEED
-from ..rig.residuals import Point
+from ..rig.residuals import ParameterPoint
 from ..rig.rig_scenario import Rig
 from .least_squares import Fit
 
@@ -75,9 +75,9 @@ def nearer_ways(
     rig: Rig,
     logs: Sequence[Prepared],
     ways: Mapping[str, Way],
-    start: Point,
-    fitted: Callable[[Rig, list[Prepared], Point], Fit],
-) -> tuple[Rig, Point, dict[str, str]]:
+    start: ParameterPoint,
+    fitted: Callable[[Rig, list[Prepared], ParameterPoint], Fit],
+) -> tuple[Rig, ParameterPoint, dict[str, str]]:
     """(rig, where the search goes on, words): inputs go the other way if fits are nearer to the logs then.
 
     A command that its sender holds for one sample looks like one that moves on between samples: only runs tell them apart.

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import need
-from .least_squares import Fit, Problem, moved, room_of, search, slope_of
+from .least_squares import Fit, FitProblem, moved, room_of, search, slope_of
 
 RESAMPLES = 2000
 CLUSTERS = 5  # logs or conditions, from which on they are drawn as wholes
@@ -29,7 +29,7 @@ class Interval:
     """why the interval may miss the value: the structure of the residuals; empty if these are noise"""
 
 
-def bootstrap(problem: Problem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
+def bootstrap(problem: FitProblem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
     """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
 
     Segments of the gradient of half a second each are drawn with replacement. So lasting errors, such as those of an
@@ -79,7 +79,7 @@ def _drawn(blocks: np.ndarray, draw: np.random.Generator) -> np.ndarray:
     return np.asarray(count @ blocks)
 
 
-def _clusters(problem: Problem, fit: Fit) -> list[np.ndarray]:
+def _clusters(problem: FitProblem, fit: Fit) -> list[np.ndarray]:
     """Pieces of the gradient of whole logs, and of the logs of each condition: clusters x parameters, about their mean."""
     of_logs = np.array([score.sum(axis=0) for score in fit.scores])
     found = [of_logs]
@@ -132,7 +132,7 @@ def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndar
     return ends[0], ends[1]
 
 
-def profile(problem: Problem, fit: Fit, name: str, points: int = 3) -> tuple[Interval, list[tuple[float, float]]]:
+def profile(problem: FitProblem, fit: Fit, name: str, points: int = 3) -> tuple[Interval, list[tuple[float, float]]]:
     """By the values at which the loss, all other parameters fitted again, has risen by that of a 95 % interval.
 
     Returns tuple: the interval, and (value, rise of the loss) of the points that were fitted.

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...errors import InputError
 from ..prepared_log import Prepared
-from ..rig.residuals import Engine, Point
+from ..rig.residuals import Engine, ParameterPoint
 from ..rig.rig_scenario import Rig
 from ..task.file_formulas import number
 from ..task.free_parameters import FreeParameter
@@ -25,7 +25,7 @@ LARGEST_DAMPING = 1e8
 class Fit:
     """Result of a search."""
 
-    point: Point
+    point: ParameterPoint
     mae: float  # mean absolute residual, in units of the deviations if the task gives them, else SI
     cost: float  # cost of the logs that were fitted, with priors; half the sum of squares in units of the deviations
     deviations: np.ndarray  # deviations of the residuals, one for each measured channel, SI
@@ -40,7 +40,7 @@ class Fit:
 
 
 @dataclass
-class Problem:
+class FitProblem:
     """Problem of a fit: the model and the logs.
 
     Parameters of the search are ``(value - start)/step``, or of logarithmic ones ``log(value/start)/log(1.1)``.
@@ -74,7 +74,9 @@ class Problem:
         size = np.maximum(np.abs(scaled), 1e-300)
         return np.asarray(np.minimum(1.0, self.options.outlier / size))
 
-    def cost(self, residuals: Sequence[np.ndarray], deviations: np.ndarray, point: Point, correlation: float) -> float:
+    def cost(
+        self, residuals: Sequence[np.ndarray], deviations: np.ndarray, point: ParameterPoint, correlation: float
+    ) -> float:
         """Loss of all residuals, and of the priors."""
         total = 0.0
         for r in residuals:
@@ -86,7 +88,7 @@ class Problem:
                 total += 0.5 * float(np.sum(z**2))
         return total / correlation + self.prior_cost(point)
 
-    def prior_cost(self, point: Point) -> float:
+    def prior_cost(self, point: ParameterPoint) -> float:
         """Half the squares of what departs from priors."""
         total = 0.0
         for name, p in self.parameters.items():
@@ -135,7 +137,11 @@ BLOCK = 0.5  # [s] of a block of residuals
 
 
 def linearised(
-    problem: Problem, point: Point, residuals: Sequence[np.ndarray], deviations: np.ndarray, correlation: float
+    problem: FitProblem,
+    point: ParameterPoint,
+    residuals: Sequence[np.ndarray],
+    deviations: np.ndarray,
+    correlation: float,
 ) -> _Linear:
     """Normal equations with the nuisances of each log eliminated."""
     both = {**problem.parameters, **problem.nuisance}
@@ -195,7 +201,7 @@ def correlation_of(residuals: Sequence[np.ndarray]) -> float:
 
 
 def search(
-    problem: Problem, start: Point, *, iterations: int, notify: Callable[[int, float], None] | None = None
+    problem: FitProblem, start: ParameterPoint, *, iterations: int, notify: Callable[[int, float], None] | None = None
 ) -> Fit:
     """Levenberg-Marquardt from a point.
 
@@ -247,7 +253,7 @@ def search(
     return Fit(point, mae, cost, deviations, tuple(names), done, history, linear.normal, linear.scores, correlation)
 
 
-def _stepped(problem: Problem, point: Point, linear: _Linear, damping: float) -> Point:
+def _stepped(problem: FitProblem, point: ParameterPoint, linear: _Linear, damping: float) -> ParameterPoint:
     """One damped step; parameters whose bound it would pass stay on it, and the others move as if they were given."""
     names, H, g = list(problem.parameters), linear.H, linear.g
     D = np.maximum(np.diag(H), 1e-12 * max(1.0, float(np.max(np.diag(H), initial=0.0))))
@@ -278,13 +284,13 @@ def _stepped(problem: Problem, point: Point, linear: _Linear, damping: float) ->
             for k, (name, p) in enumerate(problem.nuisance.items()):
                 own[name] = moved(p, own[name], float(e[k]))
         nuisance[log.name] = own
-    return Point(values, {**point.nuisance, **nuisance})
+    return ParameterPoint(values, {**point.nuisance, **nuisance})
 
 
-def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> Problem:
+def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> FitProblem:
     """Problem of fitting a candidate model to logs."""
     task = rig.task
     given = list(rig.deviations.values())
     deviations = None if None in given else np.array(given, dtype=float)
     resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])
-    return Problem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)
+    return FitProblem(engine, logs, rung, free_on(task, rung), task.nuisance, task.fit, deviations, resolution)

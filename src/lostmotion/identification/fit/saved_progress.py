@@ -11,7 +11,7 @@ from typing import Any
 from ...atomic_writer import write_bytes
 from ...version import __version__
 from ..prepared_log import Prepared
-from ..rig.residuals import Point
+from ..rig.residuals import ParameterPoint
 from ..task.identification_file import Identification
 
 
@@ -35,7 +35,7 @@ class Progress:
         self,
         task: Identification,
         logs: Sequence[Prepared],
-        others: Mapping[str, tuple[Point, list[Point]]] | None = None,
+        others: Mapping[str, tuple[ParameterPoint, list[ParameterPoint]]] | None = None,
     ) -> Models:
         """Models of these logs; ``others``: values of models of almost the same logs, by name."""
         digest = hashlib.sha256(task.model_dump_json().encode())
@@ -70,22 +70,24 @@ class Progress:
 class Models:
     """Models of one set of logs in a `Progress`."""
 
-    def __init__(self, progress: Progress, key: str, others: Mapping[str, tuple[Point, list[Point]]]) -> None:
+    def __init__(
+        self, progress: Progress, key: str, others: Mapping[str, tuple[ParameterPoint, list[ParameterPoint]]]
+    ) -> None:
         self._progress, self._key, self._others = progress, key, others
 
-    def fitted(self, name: str) -> tuple[Point, list[Point]] | None:
+    def fitted(self, name: str) -> tuple[ParameterPoint, list[ParameterPoint]] | None:
         """(values found, other minima) of a model; None if it is not kept."""
         data = self._progress.read(self._key, name)
         return (
             self._others.get(name)
             if data is None
-            else (Point(**data["point"]), [Point(**point) for point in data["minima"]])
+            else (ParameterPoint(**data["point"]), [ParameterPoint(**point) for point in data["minima"]])
         )
 
-    def keep(self, name: str, point: Point, minima: Sequence[Point]) -> None:
+    def keep(self, name: str, point: ParameterPoint, minima: Sequence[ParameterPoint]) -> None:
         """Keep a model that has been fitted."""
 
-        def plain(p: Point) -> dict[str, Any]:
+        def plain(p: ParameterPoint) -> dict[str, Any]:
             return {"values": p.values, "nuisance": p.nuisance}
 
         self._progress.write(self._key, name, {"point": plain(point), "minima": [plain(p) for p in minima]})

@@ -14,8 +14,8 @@ import numpy as np
 from ...errors import InputError
 from ..prepared_log import Prepared
 from ..rig.inverse_dynamics import Stretch, missing_torque, stretches
-from ..rig.measured_motion import Shown, names_of_channel, shown_motion, windows
-from ..rig.residuals import Engine, Point
+from ..rig.measured_motion import ShownMotion, names_of_channel, shown_motion, windows
+from ..rig.residuals import Engine, ParameterPoint
 from ..rig.rig_scenario import Rig
 from ..task.file_formulas import names_in
 from ..task.free_parameters import FreeParameter
@@ -51,8 +51,8 @@ class Regression:
 
 
 def regressed(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, free: Mapping[str, FreeParameter]
-) -> tuple[Point, Regression]:
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, free: Mapping[str, FreeParameter]
+) -> tuple[ParameterPoint, Regression]:
     """Start values of the first candidate model.
 
     logs: that are fitted.
@@ -70,7 +70,7 @@ def regressed(
                 refusal = refusal or str(problem)  # that of the narrowest filter, which has the most samples
                 continue
             solved = solved or bool(values)
-            there = Point({**point.values, **values}, point.nuisance)
+            there = ParameterPoint({**point.values, **values}, point.nuisance)
             if values and (new := _error(rig, engine, judged, there)) < error:
                 best, report, error = there, Regression(values, kept), new
     except InputError as problem:
@@ -83,7 +83,7 @@ def regressed(
     return best, report
 
 
-def _windows_or_logs(rig: Rig, logs: Sequence[Prepared], point: Point) -> Sequence[Prepared]:
+def _windows_or_logs(rig: Rig, logs: Sequence[Prepared], point: ParameterPoint) -> Sequence[Prepared]:
     """Data for runs: short windows if the state is measured, so that errors do not add up."""
     try:
         length = WINDOW * WIDTHS[-1] * max(log.log.interval for log in logs)
@@ -92,7 +92,7 @@ def _windows_or_logs(rig: Rig, logs: Sequence[Prepared], point: Point) -> Sequen
         return logs
 
 
-def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point) -> float:
+def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint) -> float:
     """Mean absolute residual in units of the deviations."""
     units = np.array([deviation or 1.0 for deviation in rig.deviations.values()])[:, None]
     rows = [np.abs(r / units).ravel() for r in engine.residuals(logs, point, 0)]
@@ -101,7 +101,12 @@ def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point) -> 
 
 
 def _solved(
-    rig: Rig, logs: Sequence[Prepared], point: Point, free: Mapping[str, FreeParameter], shown: Shown, width: int
+    rig: Rig,
+    logs: Sequence[Prepared],
+    point: ParameterPoint,
+    free: Mapping[str, FreeParameter],
+    shown: ShownMotion,
+    width: int,
 ) -> tuple[dict[str, float], dict[str, str]]:
     """(values found, why others are not) with one filter. Raises InputError: there is no regression."""
     balance = _Balance(rig, logs, point, shown, width)
@@ -153,7 +158,9 @@ def _step(p: FreeParameter, value: float) -> float:
 class _Balance:
     """The missing torques of all blocks of some logs, at the start and beside it."""
 
-    def __init__(self, rig: Rig, logs: Sequence[Prepared], point: Point, shown: Shown, width: int) -> None:
+    def __init__(
+        self, rig: Rig, logs: Sequence[Prepared], point: ParameterPoint, shown: ShownMotion, width: int
+    ) -> None:
         self._rig, self._point, self._shown = rig, point, shown
         self._stretches: list[Stretch] = []
         rows, refused = [], ""

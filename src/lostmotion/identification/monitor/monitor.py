@@ -24,11 +24,11 @@ from ...verdict import State, Verdict
 from ..candidate_models import grown, is_rough
 from ..fit.input_courses import as_recorded, nearer_ways
 from ..fit.intervals import bootstrap
-from ..fit.least_squares import Fit, Problem, problem_of, search
+from ..fit.least_squares import Fit, FitProblem, problem_of, search
 from ..preparation.recorder_pauses import split_at_pauses
 from ..preparation.usable_logs import gathered
 from ..prepared_log import Prepared
-from ..rig.residuals import Engine, Point, start_point
+from ..rig.residuals import Engine, ParameterPoint, start_point
 from ..rig.rig_scenario import Rig
 from ..task.file_formulas import number
 from ..task.free_parameters import FreeParameter
@@ -228,12 +228,12 @@ def _with_courses(rig: Rig, parts: Sequence[Prepared]) -> tuple[Rig, list[str]]:
     if undecided:
         reference, some = _at_start(rig), [replace(part, held_out=False) for part in parts[:FIRST]]
 
-        def fitted(other: Rig, logs: list[Prepared], point: Point) -> Fit:
+        def fitted(other: Rig, logs: list[Prepared], point: ParameterPoint) -> Fit:
             problem = problem_of(other, Engine(other, 1), logs, reference.rung)
             return search(replace(problem, parameters=reference.free), point, iterations=ITERATIONS)
 
         with suppress(InputError):  # a log without a run: it is named with its estimate
-            start = Point(dict(reference.values), start_point(rig.task, some).nuisance)
+            start = ParameterPoint(dict(reference.values), start_point(rig.task, some).nuisance)
             rig, _, more = nearer_ways(rig, some, undecided, start, fitted)
             words |= more
     return rig, list(words.values())
@@ -350,16 +350,16 @@ class _Estimator:
         self._smallest = min(self._smallest, residual)
         return LogEstimate(log.name, at, values, deviations, wide, residual, conditions, frozenset(told))
 
-    def _problem(self, parts: Sequence[Prepared]) -> Problem:
+    def _problem(self, parts: Sequence[Prepared]) -> FitProblem:
         r = self.reference
         problem = problem_of(r.rig, self._engine, [replace(part, held_out=False) for part in parts], r.rung)
         return replace(problem, parameters=r.free, given=r.deviations)
 
-    def _fit(self, problem: Problem) -> tuple[Fit, list[np.ndarray]]:
+    def _fit(self, problem: FitProblem) -> tuple[Fit, list[np.ndarray]]:
         """From the median of the logs so far; where that ends in residuals that are no noise, from other values too."""
         own = start_point(self.reference.rig.task, problem.logs).nuisance
         near = {name: self._median(name) for name in self.reference.free}
-        start = Point({**self.reference.values, **near}, own)
+        start = ParameterPoint({**self.reference.values, **near}, own)
         best = self._searched(problem, start)
         if not self._rough or self._as_before(problem, best):
             return best
@@ -372,15 +372,15 @@ class _Estimator:
                 break
         return best
 
-    def _searched(self, problem: Problem, start: Point) -> tuple[Fit, list[np.ndarray]]:
+    def _searched(self, problem: FitProblem, start: ParameterPoint) -> tuple[Fit, list[np.ndarray]]:
         fit = search(problem, start, iterations=ITERATIONS)
         return fit, self._engine.residuals(problem.logs, fit.point, problem.rung)
 
-    def _as_before(self, problem: Problem, found: tuple[Fit, list[np.ndarray]]) -> bool:
+    def _as_before(self, problem: FitProblem, found: tuple[Fit, list[np.ndarray]]) -> bool:
         """Whether the residuals are noise, or as small as those of other logs."""
         return self._size(problem, found[1]) < LARGE * self._smallest or explained(problem, found[1])
 
-    def _size(self, problem: Problem, residuals: Sequence[np.ndarray]) -> float:
+    def _size(self, problem: FitProblem, residuals: Sequence[np.ndarray]) -> float:
         """Root mean square of the residuals: in SI, or in the deviations that the task states, of all logs alike."""
         deviations = self.reference.deviations if self.reference.given else None
         unit = np.ones((len(residuals[0]), 1)) if deviations is None else deviations[:, None]

@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...model.torsion import Rigid
 from ..prepared_log import Prepared, Segment

@@ -18,7 +18,7 @@ import numpy as np
 
 from ...units.practical import counted
 from .log import Channel, Log
-from .log_tables import SECONDS, Row, Stamps, UnreadError, named_columns, remedy_for_cell, table_log, units_below
+from .log_tables import SECONDS, Stamps, TableRow, UnreadError, named_columns, remedy_for_cell, table_log, units_below
 
 IN_ROW = 3  # rows of one length, with a number first, from which on a table begins
 HEADER = 200  # lines above a table, at most
@@ -30,7 +30,9 @@ TIME_OF = "time of "
 Number = Callable[[Any], float | None]
 
 
-def odd_table_log(path: Path, rows: Sequence[Row], number: Number, comments: list[str], time: str) -> tuple[int, Log]:
+def odd_table_log(
+    path: Path, rows: Sequence[TableRow], number: Number, comments: list[str], time: str
+) -> tuple[int, Log]:
     """(number of lines and cells that are lost, the log).
 
     rows, number, comments, time: as in `table_log`.
@@ -61,7 +63,7 @@ def odd_table_log(path: Path, rows: Sequence[Row], number: Number, comments: lis
     return lost, replace(log, channels=channels, notes=(*log.notes, *notes))
 
 
-def _begins(rows: Sequence[Row], number: Number) -> bool:
+def _begins(rows: Sequence[TableRow], number: Number) -> bool:
     """Whether some rows look like the first ones of a table: a time, and numbers in half of the cells."""
     if len(rows) < IN_ROW or len({len(cells) for _, cells in rows}) > 1 or len(rows[0][1]) < 2:
         return False
@@ -73,7 +75,7 @@ def _begins(rows: Sequence[Row], number: Number) -> bool:
     )
 
 
-def _heading(head: Sequence[Row], width: int, number: Number, comments: list[str]) -> tuple[list[Row], bool]:
+def _heading(head: Sequence[TableRow], width: int, number: Number, comments: list[str]) -> tuple[list[TableRow], bool]:
     """(heading and row of units, whether each channel has a column of the time); other lines become comments of the header."""
     pairs: dict[str, list[str]] = {}
     for _, cells in head:
@@ -105,8 +107,8 @@ def _distinct(names: Sequence[str]) -> list[str]:
 
 
 def _mended(
-    names: Sequence[str], body: Sequence[Row], width: int, number: Number, time: str
-) -> tuple[list[Row], int, list[str], list[str]]:
+    names: Sequence[str], body: Sequence[TableRow], width: int, number: Number, time: str
+) -> tuple[list[TableRow], int, list[str], list[str]]:
     """(rows that fit, with empty cells in place of words; how much is lost; notes on it; columns of words)."""
     lines = [row for row in body if len(row[1]) != width]
     kept = [(line, list(cells)) for line, cells in body if len(cells) == width]

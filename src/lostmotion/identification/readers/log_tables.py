@@ -29,7 +29,7 @@ EPOCH = datetime(1970, 1, 1)
 TIME_NAMES = ("time", "t", "timestamp", "times", "tm")
 SECONDS = {"": 1.0, "s": 1.0, "sec": 1.0, "ms": 1e-3, "us": 1e-6, "µs": 1e-6, "ns": 1e-9, "min": 60.0}
 
-Row = tuple[int, Sequence[Any]]  # its number in the file, its cells
+TableRow = tuple[int, Sequence[Any]]  # its number in the file, its cells
 
 
 class UnreadError(Exception):
@@ -87,7 +87,7 @@ def _nanoseconds(cell: Any) -> tuple[int, bool] | None:
 
 
 def table_log(
-    path: Path, rows: Iterator[Row], number: Callable[[Any], float | None], comments: list[str], time: str
+    path: Path, rows: Iterator[TableRow], number: Callable[[Any], float | None], comments: list[str], time: str
 ) -> Log:
     """The log that a table is.
 
@@ -138,8 +138,8 @@ Columns = list[tuple[str, str | None]]
 
 
 def _columns(
-    first: int, cells: Sequence[Any], number: Callable[[Any], float | None], above: str, rows: Iterator[Row]
-) -> tuple[Columns, list[str], list[Row]]:
+    first: int, cells: Sequence[Any], number: Callable[[Any], float | None], above: str, rows: Iterator[TableRow]
+) -> tuple[Columns, list[str], list[TableRow]]:
     """((name, unit) of each column, notes, rows of values that have been read already)."""
     blank = [cell is None or not str(cell).strip() for cell in cells]
     if all(blank) or not all(b or _is_value(cell, number) for cell, b in zip(cells, blank, strict=True)):
@@ -164,7 +164,7 @@ def _is_value(cell: Any, number: Callable[[Any], float | None]) -> bool:
     return number(cell) is not None or _nanoseconds(cell) is not None
 
 
-def units_below(row: Row, count: int, number: Callable[[Any], float | None]) -> list[str | None] | None:
+def units_below(row: TableRow, count: int, number: Callable[[Any], float | None]) -> list[str | None] | None:
     """Units in the row below a heading; None where it is no such row."""
     texts = [str(cell if cell is not None else "").strip() for cell in row[1]]
     if len(texts) != count or not any(texts) or any(_is_value(text, number) for text in texts):
@@ -252,7 +252,7 @@ def _header(comments: list[str], number: Callable[[Any], float | None]) -> tuple
 
 
 def _numbers(
-    names: list[str], place: int, stamps: Stamps, number: Callable[[Any], float | None], rows: Iterator[Row]
+    names: list[str], place: int, stamps: Stamps, number: Callable[[Any], float | None], rows: Iterator[TableRow]
 ) -> np.ndarray:
     found = array("d")
     for row, cells in rows:

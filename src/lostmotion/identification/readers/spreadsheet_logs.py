@@ -17,7 +17,7 @@ from ...inputs.validation import listed
 from ...inputs.zip_files import members
 from .irregular_tables import odd_table_log
 from .log import Log, as_refusal
-from .log_tables import Row, UnreadError, plain_number, table_log
+from .log_tables import TableRow, UnreadError, plain_number, table_log
 
 PER_ELEMENT = 1500  # bytes of memory for an element of a part that describes the workbook, measured of styles
 PER_TEXT = 200  # bytes of memory for an element of the list of texts
@@ -66,7 +66,7 @@ def _of_book(path: Path, book: Any, clock: str) -> Log:
     raise InputError("has no sheet with values; save the log in the first sheet", where=path)
 
 
-def _table(path: Path, rows: list[Row], comments: list[str], time: str) -> Log:
+def _table(path: Path, rows: list[TableRow], comments: list[str], time: str) -> Log:
     """The log of a sheet, without the lines and cells that cannot be read."""
     try:
         return table_log(path, iter(rows), _number, comments, time)
@@ -77,7 +77,7 @@ def _table(path: Path, rows: list[Row], comments: list[str], time: str) -> Log:
             raise problem from None
 
 
-def _chained(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
+def _chained(first: TableRow, rows: Iterator[TableRow]) -> Iterator[TableRow]:
     """Rows of the length of the first: cells that a sheet does not hold are empty."""
     width = len(first[1])
     yield first
@@ -85,7 +85,7 @@ def _chained(first: Row, rows: Iterator[Row]) -> Iterator[Row]:
         yield number, [*cells, *[None] * (width - len(cells))]
 
 
-def _rows(sheet: Any, comments: list[str]) -> Iterator[Row]:
+def _rows(sheet: Any, comments: list[str]) -> Iterator[TableRow]:
     """Rows with something in them, without empty cells at their ends; comments are put into the list."""
     for number, row in enumerate(sheet.iter_rows(values_only=True), 1):
         cells = list(row)

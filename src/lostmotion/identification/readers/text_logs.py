@@ -16,7 +16,7 @@ from ...errors import InputError
 from ...inputs.limits import check_memory
 from .irregular_tables import odd_table_log
 from .log import Log, reason
-from .log_tables import Row, UnreadError, plain_number, split_at_spaces, table_log
+from .log_tables import TableRow, UnreadError, plain_number, split_at_spaces, table_log
 
 PER_CELL = 11  # bytes of memory for a value while the table grows, measured
 WITH_COMMA = re.compile(r"\s*[+-]?\d+(,\d+)?([eE][+-]?\d+)?\s*")
@@ -114,7 +114,7 @@ def _announced(path: Path, log: Log, reading: Reading) -> Log:
     return replace(log, notes=(note, *log.notes))
 
 
-def _rows(text: str, comments: list[str], reading: Reading) -> Iterator[Row]:
+def _rows(text: str, comments: list[str], reading: Reading) -> Iterator[TableRow]:
     for number, line in _lines(text, comments):
         reading.line = number
         try:

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 from scipy.signal import savgol_filter
 
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...model.angle_torques import STANDARD_GRAVITY, Gravity, PositionHarmonic, TorqueHarmonic
 from ...model.losses import ConstantEfficiency, MeshEfficiency
@@ -24,7 +24,7 @@ from ...model.motor import ShaftMotor
 from ...simulation.scenario.scenario import Scenario
 from ..prepared_log import Prepared
 from .log_inputs import DELAY, course_of_input, numbers_of_input
-from .measured_motion import Shown, measured_course
+from .measured_motion import ShownMotion, measured_course
 from .rig_scenario import Rig
 
 PAUSE = 3.0  # times the sample interval: there the samples are taken as two pieces
@@ -43,7 +43,7 @@ class Stretch:
     blocks: np.ndarray  # samples of each piece in which the shaft turns in one direction: blocks x samples
 
 
-def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: Shown, width: int) -> list[Stretch]:
+def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: ShownMotion, width: int) -> list[Stretch]:
     """All of a log that is long enough.
 
     width: samples of the filter, cubics by least squares (Savitzky and Golay 1964), and of a block; odd.
@@ -71,7 +71,7 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: Shown, w
     return found
 
 
-def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, shown: Shown) -> np.ndarray:
+def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, shown: ShownMotion) -> np.ndarray:
     """r of each block [N·m].
 
     Raises InputError: the rig is not one that moves as one shaft, or a torque is not known: why.

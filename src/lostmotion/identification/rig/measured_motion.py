@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...model.train import DriveTrain
 from ..prepared_log import Prepared, Segment
@@ -17,14 +17,14 @@ from ..task.file_formulas import names_in
 from ..task.identification_file import FormulaText
 from .measured_motion_input import refuse_given_motion
 from .measurement_model import numbers_of
-from .residuals import Point
+from .residuals import ParameterPoint
 from .rig_scenario import Rig
 
 LEAST = 5  # samples of a cubic
 
 
 @dataclass(frozen=True)
-class Shown:
+class ShownMotion:
     """A measured channel that shows the motion of a shaft."""
 
     channel: str
@@ -32,7 +32,7 @@ class Shown:
     is_speed: bool  # whether it shows the speed; else the angle
 
 
-def shown_motion(rig: Rig) -> Shown:
+def shown_motion(rig: Rig) -> ShownMotion:
     """The first measured channel that shows an angle, or if none does and no torque depends on the angle, a speed.
 
     Raises InputError: none does.
@@ -43,11 +43,11 @@ def shown_motion(rig: Rig) -> Shown:
     by_variable = {train.angle_of(s): s for s in train.shafts}
     for name, variable in plain.items():
         if variable in by_variable:
-            return Shown(name, by_variable[variable], is_speed=False)
+            return ShownMotion(name, by_variable[variable], is_speed=False)
     by_speed = {train.speed_of(s): s for s in train.shafts}
     for name, variable in plain.items():
         if variable in by_speed and not depends_on_angle(train):
-            return Shown(name, by_speed[variable], is_speed=True)
+            return ShownMotion(name, by_speed[variable], is_speed=True)
     if any(variable in by_speed for variable in plain.values()):
         raise InputError("no measured channel shows the angle of a shaft without a filter, on which torques depend")
     raise InputError("no measured channel is the angle or the speed of a shaft without a filter")
@@ -77,7 +77,7 @@ def names_of_channel(rig: Rig, channel: str) -> frozenset[str]:
     return names_in(m.scale) | names_in(m.offset) | names_in(m.delay)
 
 
-def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length: float) -> list[Prepared]:
+def windows(rig: Rig, logs: Sequence[Prepared], point: ParameterPoint, rung: int, length: float) -> list[Prepared]:
     """Logs in windows, each run of which begins at the angle and the speed that were measured there, or at the speed alone.
 
     length: of a window [s].
@@ -93,7 +93,9 @@ def windows(rig: Rig, logs: Sequence[Prepared], point: Point, rung: int, length:
     return [_in_windows(rig, log, point, rung, length, shown) for log in logs]
 
 
-def _in_windows(rig: Rig, log: Prepared, point: Point, rung: int, length: float, shown: Shown) -> Prepared:
+def _in_windows(
+    rig: Rig, log: Prepared, point: ParameterPoint, rung: int, length: float, shown: ShownMotion
+) -> Prepared:
     known = {**log.facts, **point.of(log)}
     built = rig.built(rig.changes(known, rung, log.segments[0].phase))
     scenario = built.scenario

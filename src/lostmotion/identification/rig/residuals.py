@@ -19,7 +19,7 @@ TOGETHER = 32  # logs that are run at once: the scenarios of more take much memo
 
 
 @dataclass(frozen=True)
-class Point:
+class ParameterPoint:
     """Values of all parameters, and of the nuisances of each log by its name."""
 
     values: dict[str, float]
@@ -47,7 +47,11 @@ class Engine:
         self.failed: dict[str, str] = {}  # by log: why it has no run, where residuals were last asked for
 
     def residuals(
-        self, logs: Sequence[Prepared], point: Point, rung: int, derivatives: Mapping[str, FreeParameter] | None = None
+        self,
+        logs: Sequence[Prepared],
+        point: ParameterPoint,
+        rung: int,
+        derivatives: Mapping[str, FreeParameter] | None = None,
     ) -> list[np.ndarray]:
         """Residuals of each log, weighted, one row for each measured channel, SI; NaN if the rig has no motion,
         0 where the log has no number.
@@ -62,7 +66,7 @@ class Engine:
         return rows
 
     def jacobians(
-        self, logs: Sequence[Prepared], point: Point, rung: int, parameters: Mapping[str, FreeParameter]
+        self, logs: Sequence[Prepared], point: ParameterPoint, rung: int, parameters: Mapping[str, FreeParameter]
     ) -> list[np.ndarray]:
         """Derivatives of the residuals of each log by each parameter: channels x samples x parameters.
 
@@ -146,7 +150,7 @@ class _Ahead:
     """Runs with derivatives from which the next Jacobian may be made."""
 
     logs: Sequence[Prepared]
-    point: Point
+    point: ParameterPoint
     rung: int
     found: list[Seen]
     exact: list[str]  # parameters of the derivatives
@@ -168,11 +172,11 @@ def _residuals(
     return rows, failed
 
 
-def start_point(task: Identification, logs: Sequence[Prepared]) -> Point:
+def start_point(task: Identification, logs: Sequence[Prepared]) -> ParameterPoint:
     """Start values; parameters of later candidate models are off."""
     first = free_on(task, 0)
     values = {
         name: p.start if name in first or p.fixed or p.off is None else p.off for name, p in task.parameters.items()
     }
     own = {name: p.start for name, p in task.nuisance.items()}
-    return Point(values, {log.name: dict(own) for log in logs})
+    return ParameterPoint(values, {log.name: dict(own) for log in logs})

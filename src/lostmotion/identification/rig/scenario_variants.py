@@ -9,8 +9,8 @@ from typing import Any, get_args, get_origin
 from pydantic import TypeAdapter, ValidationError
 
 from ...errors import InputError
-from ...inputs.kept import keep
-from ...inputs.named import Named
+from ...inputs.cached_values import keep
+from ...inputs.named_elements import Named
 from ...model.shaft import Shaft
 from ...model.train import DriveTrain
 from ...simulation.forms.dotted_keys import set_values

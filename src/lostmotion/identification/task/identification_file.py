@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from ...errors import prefixed
 from ...inputs.arguments import checked
-from ...inputs.named import Elements, nothing
+from ...inputs.named_elements import Elements, nothing
 from ...inputs.part import Part
 from ...inputs.quantities import NotNegative, Number, Positive, Switch, Time, Whole
 from ...inputs.toml_files import read_toml

@@ -6,7 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from ...inputs.named import Elements, nothing
+from ...inputs.named_elements import Elements, nothing
 from ...inputs.part import Part
 from ...inputs.quantities import Number, Whole
 

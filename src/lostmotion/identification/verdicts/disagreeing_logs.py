@@ -18,7 +18,7 @@ from ...errors import InputError
 from ..fit.least_squares import Fit, problem_of, search
 from ..preparation.screening import MOTION, frozen_stretches, wrapped_by
 from ..prepared_log import Prepared
-from ..rig.residuals import Engine, Point
+from ..rig.residuals import Engine, ParameterPoint
 from ..rig.rig_scenario import Rig
 from .residual_tests import explained
 
@@ -84,8 +84,8 @@ UNEXPLAINED = "no sign, unit, delay, clock, wrap, frozen or slow channel explain
 
 
 def odd_logs(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: Point, fit: Fit, rung: int
-) -> tuple[list[OddLog], Point]:
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: ParameterPoint, fit: Fit, rung: int
+) -> tuple[list[OddLog], ParameterPoint]:
     """Logs that disagree with the others, those fitted and those held out, and the point that fits the others.
 
     logs: all that were fitted or held out.
@@ -119,7 +119,7 @@ def odd_logs(
 class _Sizes:
     """Residuals of logs at a point, in units of those of logs that agree."""
 
-    def __init__(self, rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> None:
+    def __init__(self, rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> None:
         self.rig, self.engine, self.point, self.rung = rig, engine, point, rung
         problem = problem_of(rig, engine, logs, rung)
         floor = problem.resolution / math.sqrt(12.0)
@@ -175,8 +175,8 @@ def _spread(log: Prepared) -> np.ndarray:
 
 
 def _agreeing(
-    rig: Rig, engine: Engine, train: list[Prepared], start: Point, fit: Fit, rung: int
-) -> tuple[list[Prepared], Point]:
+    rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
+) -> tuple[list[Prepared], ParameterPoint]:
     """(logs that agree with each other, the point that fits them)."""
     point, kept = fit.point, train
     most = max(1, len(train) // SHARE)
@@ -195,13 +195,13 @@ def _agreeing(
 
 
 def _leave_one_out(
-    rig: Rig, engine: Engine, train: list[Prepared], start: Point, fit: Fit, rung: int
-) -> tuple[list[Prepared], Point]:
+    rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
+) -> tuple[list[Prepared], ParameterPoint]:
     """The same for few logs, of which one may have spoiled the fit so that it does not stand out."""
     problem = problem_of(rig, engine, train, rung)
     if len(train) > FEW or explained(problem, engine.residuals(train, fit.point, rung)):
         return train, fit.point
-    best: tuple[float, list[Prepared], Point] = (SUSPECT, train, fit.point)
+    best: tuple[float, list[Prepared], ParameterPoint] = (SUSPECT, train, fit.point)
     for k, log in enumerate(train):
         rest = [*train[:k], *train[k + 1 :]]
         point = _fitted(rig, engine, rest, [start], rung)
@@ -211,7 +211,9 @@ def _leave_one_out(
     return best[1:]
 
 
-def _fitted(rig: Rig, engine: Engine, logs: Sequence[Prepared], starts: Sequence[Point], rung: int) -> Point:
+def _fitted(
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], starts: Sequence[ParameterPoint], rung: int
+) -> ParameterPoint:
     """The best point of searches from some starts; the last start if none of them has a run."""
     problem = problem_of(rig, engine, logs, rung)
     best, least = starts[-1], math.inf

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.sparse.csgraph import connected_components
 
-from ..fit.least_squares import Fit, Problem, slope_of
+from ..fit.least_squares import Fit, FitProblem, slope_of
 from ..rig.rig_scenario import Rig
 from ..task.free_parameters import FreeParameter
 from .suggested_experiments import remedy_for
@@ -37,7 +37,7 @@ class Undetermined:
     """number of directions that the text describes"""
 
 
-def undetermined(problem: Problem, fit: Fit) -> list[Undetermined]:
+def undetermined(problem: FitProblem, fit: Fit) -> list[Undetermined]:
     """Directions that the logs alone, without priors, leave wider than the values themselves."""
     parameters = problem.parameters
     names = list(parameters)
@@ -83,7 +83,7 @@ def _apart(directions: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
 
 
 def _one_direction(
-    problem: Problem, fit: Fit, sizes: Mapping[str, float], vector: np.ndarray, width: float
+    problem: FitProblem, fit: Fit, sizes: Mapping[str, float], vector: np.ndarray, width: float
 ) -> Undetermined:
     largest = int(np.argmax(np.abs(vector)))
     whole = {n: float(x / vector[largest]) for n, x in zip(sizes, vector, strict=True)}
@@ -97,7 +97,7 @@ def _one_direction(
 
 
 def _several_directions(
-    problem: Problem, fit: Fit, sizes: Mapping[str, float], basis: np.ndarray, width: float
+    problem: FitProblem, fit: Fit, sizes: Mapping[str, float], basis: np.ndarray, width: float
 ) -> Undetermined:
     """Sentence on several directions of the same parameters, such as the terms of a sum."""
     freedom = dict(zip(sizes, np.linalg.norm(basis, axis=1).tolist(), strict=True))
@@ -115,7 +115,7 @@ def _several_directions(
 
 
 def _determined_of_several(
-    problem: Problem, fit: Fit, names: Sequence[str], gradient: Mapping[str, float], sizes: Mapping[str, float]
+    problem: FitProblem, fit: Fit, names: Sequence[str], gradient: Mapping[str, float], sizes: Mapping[str, float]
 ) -> str:
     """The only combination of parameters that is determined, found from pairs of them while the others stay.
 
@@ -179,7 +179,7 @@ def resting_on(
     return [Undetermined({name: 1.0, **shares}, float(width / p.step), text)]
 
 
-def _sentence(problem: Problem, fit: Fit, changes: Mapping[str, float], sizes: Mapping[str, float]) -> str:
+def _sentence(problem: FitProblem, fit: Fit, changes: Mapping[str, float], sizes: Mapping[str, float]) -> str:
     names = sorted(changes, key=lambda n: -abs(changes[n]))
     remedy = remedy_for(problem.engine.rig, names)
     if len(names) == 2 and (what := _determined_of_two(problem, fit, names[0], names[1], changes, sizes)):
@@ -193,7 +193,7 @@ def _sentence(problem: Problem, fit: Fit, changes: Mapping[str, float], sizes: M
 
 
 def _determined_of_two(
-    problem: Problem, fit: Fit, a: str, b: str, changes: Mapping[str, float], sizes: Mapping[str, float]
+    problem: FitProblem, fit: Fit, a: str, b: str, changes: Mapping[str, float], sizes: Mapping[str, float]
 ) -> str:
     """The kind of combination of two parameters along whose level lines the logs stay the same; empty if it is none of four.
 
@@ -224,7 +224,7 @@ def _determined_of_two(
     return ""
 
 
-def _departure(problem: Problem, fit: Fit, values: Mapping[str, float]) -> float:
+def _departure(problem: FitProblem, fit: Fit, values: Mapping[str, float]) -> float:
     """Root of the sum of squares, in deviations, by which runs with some other values depart from those of the fit."""
     there = replace(fit.point, values=fit.point.values | dict(values))
     runs = [problem.engine.residuals(problem.logs, point, problem.rung) for point in (fit.point, there)]

@@ -8,8 +8,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..fit.least_squares import Problem, correlation_of
-from ..rig.residuals import Point
+from ..fit.least_squares import FitProblem, correlation_of
+from ..rig.residuals import ParameterPoint
 from ..rig.rig_runs import run_logs
 from ..rig.rig_scenario import Rig
 
@@ -68,7 +68,7 @@ class Misfit:
         )
 
 
-def misfits(problem: Problem, residuals: Sequence[np.ndarray]) -> list[Misfit]:
+def misfits(problem: FitProblem, residuals: Sequence[np.ndarray]) -> list[Misfit]:
     """Misfits of all measured channels."""
     compared = problem.compared(residuals)
     found = []
@@ -86,7 +86,7 @@ def misfits(problem: Problem, residuals: Sequence[np.ndarray]) -> list[Misfit]:
 
 
 def with_shapes(
-    problem: Problem, point: Point, residuals: Sequence[np.ndarray], found: Sequence[Misfit]
+    problem: FitProblem, point: ParameterPoint, residuals: Sequence[np.ndarray], found: Sequence[Misfit]
 ) -> list[Misfit]:
     """With the variables over which structured residuals have a shape: time, and speed, angle and load of the rig."""
     if not any(m.structured for m in found):
@@ -195,12 +195,12 @@ def _runs(rows: Sequence[np.ndarray]) -> tuple[int, float, float]:
     return runs, expected, (runs - expected) / math.sqrt(variance) if variance > 0.0 else 0.0
 
 
-def explained(problem: Problem, residuals: Sequence[np.ndarray]) -> bool:
+def explained(problem: FitProblem, residuals: Sequence[np.ndarray]) -> bool:
     """Whether all residuals are noise, of the stated deviations where there are such."""
     return not any(m.ratio > WIDENED or m.structured for m in misfits(problem, residuals))
 
 
-def hidden(problem: Problem, residuals: Sequence[np.ndarray], found: Sequence[Misfit], correlation: float) -> float:
+def hidden(problem: FitProblem, residuals: Sequence[np.ndarray], found: Sequence[Misfit], correlation: float) -> float:
     """Bound of the weighted squares by which runs of the right values may differ from those found; 0 where noise explains the residuals.
 
     A change d of what the channels show moves the values by (J'WJ)^-1 J'W d, each by at most sqrt(((J'WJ)^-1)_kk d'Wd) (Cauchy and

@@ -17,7 +17,7 @@ from typing import Any
 import numpy as np
 
 from ..prepared_log import Prepared
-from ..rig.residuals import Engine, Point
+from ..rig.residuals import Engine, ParameterPoint
 from ..rig.rig_scenario import Rig
 from .disagreeing_logs import OddLog
 
@@ -89,7 +89,7 @@ def family(fault: str) -> str:
 
 
 def shared_faults(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], odd: Sequence[OddLog], point: Point, rung: int
+    rig: Rig, engine: Engine, logs: Sequence[Prepared], odd: Sequence[OddLog], point: ParameterPoint, rung: int
 ) -> list[SharedFault]:
     """Faults of the model's kind that several logs share.
 
@@ -249,7 +249,7 @@ def _is_number(word: str) -> bool:
 
 
 def _candidate(
-    rig: Rig, engine: Engine, own: Sequence[Prepared], rest: Sequence[Prepared], point: Point, rung: int
+    rig: Rig, engine: Engine, own: Sequence[Prepared], rest: Sequence[Prepared], point: ParameterPoint, rung: int
 ) -> str:
     """Limit of the rate or filter of an input with which the residuals of some logs are far smaller, and those of the others not larger."""
     some, others = [_fresh(log) for log in own[:TRIED]], [_fresh(log) for log in rest[:TRIED]]
@@ -300,7 +300,14 @@ def _with(rig: Rig, name: str, key: str, value: float) -> Rig:
 
 
 def _tried(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], point: Point, rung: int, name: str, key: str, value: float
+    rig: Rig,
+    engine: Engine,
+    logs: Sequence[Prepared],
+    point: ParameterPoint,
+    rung: int,
+    name: str,
+    key: str,
+    value: float,
 ) -> tuple[float, float]:
     other = Engine(_with(rig, name, key, value), engine.threads)
     return _size(other, [_fresh(log) for log in logs], point, rung), value
@@ -310,7 +317,7 @@ def _fresh(log: Prepared) -> Prepared:
     return replace(log, cache={})
 
 
-def _size(engine: Engine, logs: Sequence[Prepared], point: Point, rung: int) -> float:
+def _size(engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> float:
     """Median of the root mean squares of logs."""
     if not logs:
         return 0.0

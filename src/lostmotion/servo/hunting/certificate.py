@@ -14,14 +14,14 @@ from ...inputs.arguments import checked
 from ...inputs.quantities import argument
 from ...inputs.validation import shown
 from ...simulation.scenario.scenario import Scenario
-from ..regimes import Axis, axis_of
-from .at_rest import at_rest
+from ..linear_regimes import Axis, axis_of
 from .break_away_map import Image, Transients, image
+from .hunting_decision import moving_input
+from .limit_cycle_causes import at_rest
 from .limit_cycles import SAMPLES, UndrivenLoop
 from .proof import Certainty, Proof, prove
 from .sampled_proof import map_without_steps, prove_sampled, reached_by_run
 from .sampled_stuck_contact import SampledSlip, sampled_slip
-from .standstill import moving_input
 from .stuck_contact import AtRestError, StickSlip, UndecidableError, stick_slip
 
 if TYPE_CHECKING:

@@ -19,10 +19,10 @@ from ...response.shooting import floquet_multipliers, is_stable, motion_of
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.units_of_keys import unit_for
 from ...worker_threads import thread_pool
-from ..regimes import axis_of
-from .at_rest import PART, at_rest, without, without_backlash, without_friction
+from ..linear_regimes import axis_of
+from .hunting_decision import Verdict
+from .limit_cycle_causes import PART, at_rest, without, without_backlash, without_friction
 from .limit_cycles import CycleSearch, UndrivenLoop, find_limit_cycle
-from .standstill import Verdict
 
 if TYPE_CHECKING:
     import xarray
@@ -178,7 +178,7 @@ def without_saturation(train: Scenario) -> Scenario | None:
 
 def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
     """By a long run, as the servo report has it."""
-    from .at_rest import limit_cycle as watched
+    from .limit_cycle_causes import limit_cycle as watched
 
     axis = axis_of(train, motor)
     if axis.controller.position is None:

@@ -15,7 +15,7 @@ from ...response.shooting import PERIODICITY, SAMPLES_PER_PERIOD, reason_of
 from ...simulation.runs.core_runs import core_case
 from ...simulation.scenario.requirements import need_free_motion
 from ...simulation.scenario.scenario import Scenario
-from .standstill import FOREVER, NOTHING_MOVES, Outlook, Verdict, Watch, frequency_of
+from .hunting_decision import FOREVER, NOTHING_MOVES, Outlook, Verdict, WatchedRun, frequency_of
 
 SAMPLES = 4000  # of the run that is watched
 LONGER = 40  # runs, each four times as long as the one before, or twice as long as until a contact breaks away
@@ -94,7 +94,7 @@ class UndrivenLoop:
 
     def outlook(self, duration: float) -> Outlook:
         """Conclusion from the state at a time after the inputs have come to rest."""
-        watch = Watch(self.scenario, (self.watched,))
+        watch = WatchedRun(self.scenario, (self.watched,))
         watch.follow(duration, FEW)
         return watch.outlook(duration / FEW)[0]
 

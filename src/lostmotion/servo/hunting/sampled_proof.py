@@ -15,14 +15,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...units.practical import counted
-from ..regimes import Axis
+from ..linear_regimes import Axis
 from .exact_slips import Slips
+from .hunting_decision import WatchedRun
 from .proof import MARGIN, WIDER, Proof
 from .quantised_slip_end import finish, loudest
 from .sampled_stuck_contact import SampledSlip, never_rests
-from .standstill import Watch
 from .state_boxes import BoxFollower, starts
 from .stuck_contact import UndecidableError
 
@@ -223,7 +223,7 @@ def reached_by_run(axis: Axis, contact: SampledSlip, largest: float) -> float:
     name = contact.name.removesuffix("_contact")
     angle = axis.train.angle_of(name)
     to = axis.controller.reference.pieces()[-1][1] * (turns(axis.train, name, axis.shaft) or 1.0)
-    watch, duration = Watch(axis.scenario, (angle,)), axis.scenario.simulation.duration
+    watch, duration = WatchedRun(axis.scenario, (angle,)), axis.scenario.simulation.duration
     window = watch.window(contact.tick * contact.ramp.ticks)
     for _ in range(RUNS):
         for _ in range(CHECKS):

@@ -18,13 +18,13 @@ import numpy as np
 from ... import _core
 from ...control.controller import Controller
 from ...control.loops import FirstOrderCurrent, IdealCurrent
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...response.linear import LinearModel
 from ...simulation.forms.initial_state import start_values
 from ...simulation.forms.train_tables import TrainInitial
-from ..regimes import Axis, model_at
-from .standstill import FOREVER
+from ..linear_regimes import Axis, model_at
+from .hunting_decision import FOREVER
 from .stuck_contact import NONE, AtRestError, UndecidableError, only_contact, others
 
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...model.signals import core_signal
 from ...model.torsion import Rigid

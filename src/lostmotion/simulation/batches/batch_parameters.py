@@ -6,7 +6,7 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from ...inputs.doubts import trusted
+from ...inputs.implausible_values import trusted
 from ..runs.sensitivities import value_at
 from ..scenario.scenario import Scenario
 

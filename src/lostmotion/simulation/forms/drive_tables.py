@@ -10,8 +10,8 @@ from ...control.command import CommandSignal
 from ...control.controller import Controller
 from ...data_sheets.components import Conditions
 from ...errors import InputError
-from ...inputs.kept import kept
-from ...inputs.named import Named
+from ...inputs.cached_values import kept
+from ...inputs.named_elements import Named
 from ...inputs.part import Part
 from ...inputs.quantities import Angle, NotNegative, Speed, Switch, Torque
 from ...model.drive import Drive

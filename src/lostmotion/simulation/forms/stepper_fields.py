@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...control.command import CommandSignal, CurrentLevel, FieldAngle, Stepping
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...inputs.quantities import Number
 from ...inputs.validation import did_you_mean, shown
 from ...model.signals import Signal

@@ -16,14 +16,14 @@ from ...control.controller import AnyController, Controller
 from ...control.references import PositionReference, SlideReference
 from ...data_sheets.train_components import CONDITIONS, RECORDS
 from ...errors import inside
-from ...inputs.kept import kept
-from ...inputs.named import Elements, Named, nothing
+from ...inputs.cached_values import kept
+from ...inputs.named_elements import Elements, Named, nothing
 from ...inputs.part import Part
 from ...inputs.quantities import Angle, Force, Length, LinearSpeed, NotNegative, Number, Speed, Switch, Torque
 from ...model.linear_train import LinearElements
 from ...model.motor import MotorLaw
 from ...model.shaft import Shaft
-from ...model.signals import ForceSignal, Signal, SlideSpeedSignal, SpeedSignal, TorqueSignal, constant_or
+from ...model.signals import ForceSignal, GivenSpeedSignal, Signal, SlideSpeedSignal, TorqueSignal, constant_or
 from ...model.slide import Slide
 from ...model.task import Task
 from ...model.train import DriveTrain
@@ -38,7 +38,7 @@ class ShaftTable(Shaft):
 
     torque: TorqueSignal | None = None
     """M_Z, against its motion; left out, none can act on it"""
-    speed: SpeedSignal | None = None
+    speed: GivenSpeedSignal | None = None
     """speed that it has whatever acts on it; the torque that this takes is the variable ``NAME_drive_torque``; left out, it moves as the torques let it"""
     motion: PositionReference | None = None
     """angle that it has whatever acts on it, such as moves, in place of speed"""

@@ -13,7 +13,7 @@ import numpy as np
 from ... import _core
 from ...errors import InputError
 from ...inputs.arguments import checked
-from ...inputs.kept import kept
+from ...inputs.cached_values import kept
 from ...version import __version__
 from ..scenario.field_oriented_motors import set_torques
 from ..scenario.scenario import Scenario

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, overload
 
 from ...control.axis import BoundController
 from ...control.command import CommandSignal
-from ...control.law import as_laws
+from ...control.custom_controller import as_laws
 from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.limits import check_free

@@ -16,7 +16,7 @@ import numpy as np
 from ... import _core
 from ...control.axis import BoundController
 from ...errors import InputError
-from ...inputs.doubts import trusted
+from ...inputs.implausible_values import trusted
 from ...inputs.validation import shortened, shown
 from ..forms.dotted_keys import list_index
 from ..scenario.key_suggestions import near_key

@@ -9,8 +9,8 @@ import numpy as np
 
 from ...control.axis import BoundController, own
 from ...control.controller import Controller
-from ...inputs.kept import kept
-from ...inputs.named import Named
+from ...inputs.cached_values import kept
+from ...inputs.named_elements import Named
 from ...model.linear_train import LinearElements
 from ...model.train import COUPLINGS
 from ..forms.train_tables import TrainInitial

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...model.gear import Gear
 from ...model.gearbox import Gearbox
 from ...model.gears_in_series import DIRECT, in_series

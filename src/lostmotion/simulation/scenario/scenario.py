@@ -14,14 +14,14 @@ from ... import _core
 from ...control.axis import NO_LAWS, BoundController, core_control, motor_laws
 from ...control.continuous import ContinuousController
 from ...control.controller import Controller
-from ...control.law import Law
-from ...control.turning import turns
+from ...control.custom_controller import Law
+from ...control.shaft_ratio import turns
 from ...data_sheets.components import use_records
 from ...data_sheets.train_components import use_train_records
 from ...errors import InputError
-from ...inputs.doubts import doubt_all
-from ...inputs.kept import kept, kept_while_used
-from ...inputs.named import Named
+from ...inputs.cached_values import kept, kept_while_used
+from ...inputs.implausible_values import doubt_all
+from ...inputs.named_elements import Named
 from ...inputs.validation import did_you_mean, shown
 from ...model.drive import Drive, DriveOfOneGear
 from ...model.gear import Gear
@@ -249,7 +249,7 @@ class Scenario:
         )
 
     def kept_values(self) -> dict[Any, Any]:
-        """Values that `inputs.kept.kept` keeps with this object."""
+        """Values that `inputs.cached_values.kept` keeps with this object."""
         return self._made  # type: ignore[no-any-return]
 
     @kept

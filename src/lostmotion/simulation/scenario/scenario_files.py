@@ -13,7 +13,7 @@ from ...data_sheets.linear_components import linear_table
 from ...data_sheets.records import find
 from ...data_sheets.train_components import RECORDS, without_record
 from ...errors import InputError, prefixed
-from ...inputs.doubts import doubt_all
+from ...inputs.implausible_values import doubt_all
 from ...inputs.schema import follow, unit_in_schema
 from ...inputs.toml_files import RESULTS, no_such_file, read_toml
 from ...inputs.toml_text import toml_text, without_empty

@@ -13,7 +13,7 @@ from ... import _core
 from ...control.axis import BoundController
 from ...control.continuous import ContinuousController
 from ...control.controller import Controller
-from ...control.law import as_laws
+from ...control.custom_controller import as_laws
 from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.quantities import Time, argument

@@ -13,7 +13,7 @@ from ...control.controller import AnyCurrent
 from ...control.references import Move, PositionReference
 from ...control.sample_times import whole_multiple
 from ...errors import InputError
-from ...inputs.doubts import doubt_window
+from ...inputs.implausible_values import doubt_window
 from ...inputs.part import Part
 from ...inputs.quantities import (
     Acceleration,
@@ -38,7 +38,7 @@ from ...model.task import Task
 from ...simulation.forms.drive_tables import LoadTable
 from ...simulation.scenario.scenario import Scenario
 from ..finding import SOURCES
-from .bound import Bound
+from .column_bounds import Bound
 
 REPEATS = 0.01  # relative difference of two cycles, within which the motion repeats
 FEWEST = 2  # cycles

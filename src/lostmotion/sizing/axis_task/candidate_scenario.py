@@ -12,7 +12,7 @@ from ...control.controller import AnyCurrent, Controller
 from ...control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
 from ...control.references import PositionReference
 from ...control.tuning import TwoInertias, suited
-from ...inputs.kept import kept
+from ...inputs.cached_values import kept
 from ...model.duty import Duty
 from ...model.gearbox import Gearbox
 from ...model.motor import Motor

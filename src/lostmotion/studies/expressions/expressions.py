@@ -17,7 +17,7 @@ import numpy as np
 from ...inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
 from ...inputs.validation import MAX_LISTED, listed, nearest, shortened
 from ...simulation.variables import VARIABLES
-from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, Parameter
+from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, FunctionParameter
 from .measures import Measure, measure, plain, power, product, text_of, total
 from .vocabulary import OF_DRIVES, OF_THE_RUN, Vocabulary
 
@@ -225,7 +225,7 @@ class _Reader:
         return Term(own, lambda names: function.of_values(*_values(given, names)))
 
     def arguments(
-        self, name: str, parameters: tuple[Parameter, ...], args: list[ast.expr], keywords: list[ast.keyword]
+        self, name: str, parameters: tuple[FunctionParameter, ...], args: list[ast.expr], keywords: list[ast.keyword]
     ) -> list[Term]:
         """The terms in the order of the parameters; texts, which only say what holds anyway, are checked and left out."""
         by_name = {p.name: p for p in parameters}
@@ -244,7 +244,7 @@ class _Reader:
         found = [self.argument(name, p, nodes[p.name]) if p.name in nodes else LEFT_OUT for p in parameters[: last + 1]]
         return [term for term in found if term is not None]
 
-    def argument(self, function: str, parameter: Parameter, node: ast.expr) -> Term | None:
+    def argument(self, function: str, parameter: FunctionParameter, node: ast.expr) -> Term | None:
         kind = parameter.kind
         here = f"{self.text!r}: {parameter.name} of {function}"
         if kind in ("time", "nearest"):

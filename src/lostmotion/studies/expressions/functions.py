@@ -22,7 +22,7 @@ Kind = Literal["series", "value", "of a run", "condition", "share", "index", "in
 from 0 to 1; a written whole number; a written instant; the text 'time'; the text 'nearest'"""
 
 
-class Parameter(NamedTuple):
+class FunctionParameter(NamedTuple):
     """Parameter of a function or method."""
 
     name: str
@@ -33,7 +33,7 @@ class Parameter(NamedTuple):
 class Function(NamedTuple):
     """Function of values (arrays of xarray over run and time) and of measures, both in the order of its parameters."""
 
-    parameters: tuple[Parameter, ...]
+    parameters: tuple[FunctionParameter, ...]
     of_values: Callable[..., Any]
     of_measures: Callable[..., Measure]
 
@@ -92,7 +92,7 @@ def _seconds(*_: Measure) -> Measure:
     return measure("s")
 
 
-X, VALUE, TIME = Parameter("x"), Parameter("x", "value"), Parameter("dim", "time", needed=False)
+X, VALUE, TIME = FunctionParameter("x"), FunctionParameter("x", "value"), FunctionParameter("dim", "time", needed=False)
 
 
 def _reduction(of_values: Callable[..., Any], of_measures: Callable[..., Measure] = _same) -> Function:
@@ -106,9 +106,9 @@ FUNCTIONS = {
     "final": Function((X,), lambda x: x.isel(time=-1), _same),
     "least": Function((X,), _reduced("least", lambda x: x.min("time")), _same),
     "largest": Function((X,), _reduced("largest", lambda x: x.max("time")), _same),
-    "dead_time": Function((X, Parameter("share", "share", needed=False)), _dead_time, _seconds),
+    "dead_time": Function((X, FunctionParameter("share", "share", needed=False)), _dead_time, _seconds),
     "tracking_error": Function(  # root mean square of the distance from a reference
-        (X, Parameter("reference", "value")),
+        (X, FunctionParameter("reference", "value")),
         lambda x, reference: _rms(x - reference),
         lambda x, reference: reduced(one_of(x, reference)),
     ),
@@ -128,43 +128,47 @@ METHODS = {
     "median": _reduction(lambda x: x.median("time")),
     "std": _reduction(lambda x: _weighted(x).std("time")),
     "var": _reduction(lambda x: _weighted(x).var("time"), lambda x: reduced(x, 2)),
-    "quantile": Function((X, Parameter("q", "share"), TIME), _quantile, lambda x, q: reduced(x)),  # noqa: ARG005
+    "quantile": Function((X, FunctionParameter("q", "share"), TIME), _quantile, lambda x, q: reduced(x)),  # noqa: ARG005
     "integrate": Function(
-        (X, Parameter("coord", "time", needed=False)),
+        (X, FunctionParameter("coord", "time", needed=False)),
         lambda x: x.integrate("time"),
         lambda x: product(reduced(x), measure("s")),
     ),
     "differentiate": Function(
-        (X, Parameter("coord", "time", needed=False)),
+        (X, FunctionParameter("coord", "time", needed=False)),
         lambda x: x.differentiate("time"),
         lambda x: product(x, measure("s"), -1),
     ),
     "idxmax": _reduction(lambda x: x.idxmax("time"), _seconds),
     "idxmin": _reduction(lambda x: x.idxmin("time"), _seconds),
     "count": _reduction(lambda x: x.count("time"), lambda x: plain(reduced(x))),
-    "any": Function((Parameter("x", "condition"), TIME), lambda x: x.any("time"), lambda x: plain(reduced(x))),
-    "all": Function((Parameter("x", "condition"), TIME), lambda x: x.all("time"), lambda x: plain(reduced(x))),
+    "any": Function((FunctionParameter("x", "condition"), TIME), lambda x: x.any("time"), lambda x: plain(reduced(x))),
+    "all": Function((FunctionParameter("x", "condition"), TIME), lambda x: x.all("time"), lambda x: plain(reduced(x))),
     "where": Function(
-        (X, Parameter("cond", "condition"), Parameter("other", "value", needed=False)),
+        (X, FunctionParameter("cond", "condition"), FunctionParameter("other", "value", needed=False)),
         lambda x, cond, *other: x.where(cond, *other),
         lambda x, cond, *other: one_of(x, *other),  # noqa: ARG005
     ),
-    "fillna": Function((X, Parameter("value", "value")), lambda x, value: x.fillna(value), one_of),
+    "fillna": Function((X, FunctionParameter("value", "value")), lambda x, value: x.fillna(value), one_of),
     "clip": Function(
-        (X, Parameter("min", "value", needed=False), Parameter("max", "value", needed=False)),
+        (X, FunctionParameter("min", "value", needed=False), FunctionParameter("max", "value", needed=False)),
         lambda x, *bounds: x.clip(*bounds),
         one_of,
     ),
     "isnull": Function((X,), lambda x: x.isnull(), lambda x: plain(x, boolean=True)),
     "notnull": Function((X,), lambda x: x.notnull(), lambda x: plain(x, boolean=True)),
-    "isel": Function((X, Parameter("time", "index")), lambda x, time: x.isel(time=time), lambda x, time: reduced(x)),  # noqa: ARG005
+    "isel": Function(
+        (X, FunctionParameter("time", "index")),
+        lambda x, time: x.isel(time=time),
+        lambda x, time: reduced(x),  # noqa: ARG005
+    ),
     "sel": Function(
-        (X, Parameter("time", "instant"), Parameter("method", "nearest", needed=False)),
+        (X, FunctionParameter("time", "instant"), FunctionParameter("method", "nearest", needed=False)),
         lambda x, time: x.sel(time=time, method="nearest"),
         lambda x, time: reduced(x),  # noqa: ARG005
     ),
 }
 """methods of a variable over time, under the names that xarray gives them"""
 
-BANDWIDTH = (Parameter("amplitude", "of a run", needed=False),)
+BANDWIDTH = (FunctionParameter("amplitude", "of a run", needed=False),)
 """parameters of `bandwidth`, whose values come from the runs"""

@@ -15,8 +15,8 @@ from ...model.gearbox import Gearbox
 from ...model.gears_in_series import DIRECT
 from ...model.linear import RatedScrew
 from ...model.motor import Motor
+from ...servo.linear_regimes import axis_of
 from ...servo.margins import unstable_pole
-from ...servo.regimes import axis_of
 from ...simulation.forms.key_aliases import MOTOR
 from ...sizing.axis_rules import (
     derated,
@@ -62,7 +62,7 @@ from .chunk_results import Runs
 HOLDS = "holds from the least to the largest losses of its kind"
 """verdict on a gearbox with estimated losses that none of them turns"""
 
-Row = dict[str, Any]
+ResultRow = dict[str, Any]
 
 
 @dataclass
@@ -233,7 +233,7 @@ class Axes:
         records = self.study.records(row)
         return {column: value_of(column, records) for column in CHOICE}
 
-    def _without_run(self, row: np.ndarray) -> Row:
+    def _without_run(self, row: np.ndarray) -> ResultRow:
         """The columns that need no run."""
         known = {column: value for column, (value, _) in self.choice(row).items()}
         gearbox, motor = self.gearbox(row), self.motor(row)
@@ -292,7 +292,7 @@ class Axes:
         share = derating(task.altitude, task.ambient_temperature, hottest)
         return with_safety(derated(findings, share), task.safety_factors)
 
-    def refused(self, row: np.ndarray) -> Row | None:
+    def refused(self, row: np.ndarray) -> ResultRow | None:
         """The columns of a pair that the rules refuse; None if it is to be run."""
         found = self.judged(row)
         if isinstance(found, InputError):
@@ -302,7 +302,7 @@ class Axes:
             return None
         return columns_of(found, CHECKS) | self._without_run(row) | self._required(row)
 
-    def _required(self, row: np.ndarray) -> Row:
+    def _required(self, row: np.ndarray) -> ResultRow:
         """The columns of a pair that is not run, for the motion that the task requires."""
         gearbox, motor = self.gearbox(row), self.motor(row)
         if isinstance(gearbox, InputError) or isinstance(motor, InputError):
@@ -354,7 +354,7 @@ class Axes:
         except (RuntimeError, ValueError):
             return ("run",)
 
-    def over(self, columns: Row) -> tuple[str, ...]:
+    def over(self, columns: ResultRow) -> tuple[str, ...]:
         """The limits that the columns of a run violate."""
         select = self.study.select
         found = [rule for rule in str(columns["violated"]).split() if rule]
@@ -364,12 +364,12 @@ class Axes:
                 found.append(name)
         return tuple(found)
 
-    def measured(self, row: np.ndarray) -> tuple[Row, int]:
+    def measured(self, row: np.ndarray) -> tuple[ResultRow, int]:
         """The columns of a pair that is run, and its switchings. Raises InputError, SolverError: it cannot be run."""
         made = until_it_repeats(self.study, row)
         columns = row_of(made, slides=self.study.slides_itself(row))
         found = self._after_run(row, made, columns["winding_temperature"])
-        more: Row = {**columns, **self._without_run(row)}
+        more: ResultRow = {**columns, **self._without_run(row)}
         whole = columns_of(found, CHECKS) | more
         if made.scenario.controller is not None and (pole := unstable_pole(axis_of(made.scenario))):
             why = f"{UNSTABLE}: {pole}"
@@ -421,7 +421,7 @@ class Axes:
 def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
     """The pairs of a piece: first the rules for all of them, then the runs of those that pass, on several threads."""
     n = len(parameters)
-    rows: list[Row | None] = [None] * n
+    rows: list[ResultRow | None] = [None] * n
     errors, switchings = [""] * n, np.zeros(n)
     tasks: list[tuple[Axes, np.ndarray]] = []
     for k, parameter in enumerate(parameters):
@@ -434,7 +434,7 @@ def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
             rows[k] = tasks[k][0].refused(own)
     waiting = [k for k, row in enumerate(rows) if row is None]
 
-    def measure(k: int) -> Row:
+    def measure(k: int) -> ResultRow:
         axes, own = tasks[k]
         try:
             row, switchings[k] = axes.measured(own)

@@ -17,7 +17,7 @@ from ...units.practical import excess, told_apart
 from ..runs.axis_pairs import Axes
 from ..study.drive_check_columns import NO_DATA, UNSTABLE
 from ..study.study import Study
-from .ranking import WINDOW, Candidate
+from .ranking import WINDOW, RankedCandidate
 
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
 STEPS = 12  # halvings: what the factor is beyond 1 is found to 0.4 % of itself
@@ -33,7 +33,7 @@ LEAST = 1e-5  # by which a longer cycle is longer
 class Miss:
     """A candidate that does not fit, with what it lacks."""
 
-    candidate: Candidate
+    candidate: RankedCandidate
     lacks: dict[str, float]  # by rule or column: by how much its limit is exceeded, as a share of it
     slower: float | None
     """a cycle so many times as long passes the rules, by evaluation; None: none up to `SLOWEST` does, or it was not tried"""
@@ -51,7 +51,7 @@ class Miss:
         return f"{short or self.candidate.why}{'; ' if self.then else ''}{self.then}"
 
 
-def misses(study: Study, ranked: list[Candidate], count: int) -> list[Miss]:
+def misses(study: Study, ranked: list[RankedCandidate], count: int) -> list[Miss]:
     """Find the candidates of a task that come nearest to fitting, the nearest first: the largest excess over a limit ranks them.
 
     study: the task.
@@ -63,7 +63,7 @@ def misses(study: Study, ranked: list[Candidate], count: int) -> list[Miss]:
     return [_tried(study, miss) for miss in found[:count]]
 
 
-def _lacks(candidate: Candidate) -> dict[str, float]:
+def _lacks(candidate: RankedCandidate) -> dict[str, float]:
     """By limit, by how much it is exceeded; empty if one of these is not a number."""
     never = WINDOW in candidate.over
     limits = [WINDOW if never and limit == "settling_time" else limit for limit in candidate.violated]
@@ -220,17 +220,17 @@ class Lacking:
     candidates: tuple[str, ...]
 
 
-def not_judged(ranked: list[Candidate]) -> list[Lacking]:
+def not_judged(ranked: list[RankedCandidate]) -> list[Lacking]:
     """Data that records lack for a run, with the candidates that this concerns."""
     return _by_datum(c for c in ranked if NO_DATA in c.violated)
 
 
-def rules_not_judged(ranked: list[Candidate]) -> list[Lacking]:
+def rules_not_judged(ranked: list[RankedCandidate]) -> list[Lacking]:
     """The rules that are not judged, grouped by the datum that is missing, with the candidates that this concerns."""
     return _by_datum(c for c in ranked if NO_DATA not in c.violated)
 
 
-def _by_datum(found: Iterable[Candidate]) -> list[Lacking]:
+def _by_datum(found: Iterable[RankedCandidate]) -> list[Lacking]:
     groups: dict[str, list[str]] = {}
     for c in found:
         for text in c.missing:

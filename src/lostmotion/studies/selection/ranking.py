@@ -25,7 +25,7 @@ NOT_RUN = "cannot be run"  # stands among the limits of a run that has failed
 
 
 @dataclass(frozen=True)
-class Candidate:
+class RankedCandidate:
     """One run of a study that selects."""
 
     run: int
@@ -62,7 +62,7 @@ class Price:
     limit: str
     excludes: int  # runs that violate it
     alone: int  # runs that violate it and nothing else
-    best: Candidate | None  # the best that would fit without it
+    best: RankedCandidate | None  # the best that would fit without it
     opens: float
     """by how much, as a share of it, the limit would have to be relaxed so that one more candidate fits; NaN where it is not known"""
     gain: float
@@ -71,7 +71,7 @@ class Price:
     """least distance of a resting load beyond the settling window, as a share of it; NaN if a load settles"""
 
 
-def candidates(table: pa.Table, study: Study) -> list[Candidate]:
+def candidates(table: pa.Table, study: Study) -> list[RankedCandidate]:
     """Rank the runs of a study that selects. Runs that fit come first, then those that violate one limit, two, ...,
     each from the best to the worst. Runs that failed come last.
 
@@ -85,19 +85,19 @@ def candidates(table: pa.Table, study: Study) -> list[Candidate]:
     return sorted(found, key=lambda c: (NOT_RUN in c.violated, len(c.violated), _rank(c, select), c.run))
 
 
-def _rank(candidate: Candidate, select: Selection) -> tuple[float, ...]:
+def _rank(candidate: RankedCandidate, select: Selection) -> tuple[float, ...]:
     values = (select.direction(column) * value for column, value in candidate.values.items())
     return tuple(math.inf if math.isnan(v) else v for v in values)
 
 
 def _candidate(
     row: dict[str, Any], study: Study, select: Selection, bounds: dict[str, tuple[float, float]]
-) -> Candidate:
+) -> RankedCandidate:
     values = {column: float(row[column]) for column in select.objectives}
     name = _name(row, study)
     choice = {column: float(row[column]) for column in CHOICE if math.isfinite(row.get(column, math.nan))}
     if row["error"]:
-        return Candidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
+        return RankedCandidate(row["run"], name, (NOT_RUN,), row["error"], "", values)
     violated, why = row.get("violated", "").split(), [row["why"]] if row.get("why") else []
     over = {rule: use - 1.0 for rule in violated if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
     missing = tuple(filter(None, row.get(MISSING, "").split(BETWEEN)))
@@ -116,7 +116,7 @@ def _candidate(
         uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
         critical = max(uses, key=lambda rule: uses[rule], default="")
         tightest = f"{critical} {share_of_limit(uses[critical])}" if critical else ""
-    return Candidate(
+    return RankedCandidate(
         run=row["run"],
         name=name,
         violated=tuple(violated),
@@ -165,7 +165,7 @@ def _excess(column: str, value: float, low: float, high: float) -> dict[str, flo
     return {column: share} if math.isfinite(share) else {}
 
 
-def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
+def prices(ranked: list[RankedCandidate], select: Selection) -> list[Price]:
     """Price of each limit that some run violates, the most critical first.
 
     ranked: from `candidates`.
@@ -190,7 +190,7 @@ def prices(ranked: list[Candidate], select: Selection) -> list[Price]:
     return sorted(out, key=lambda p: -p.excludes)
 
 
-def pareto_front(ranked: list[Candidate], select: Selection) -> list[Candidate]:
+def pareto_front(ranked: list[RankedCandidate], select: Selection) -> list[RankedCandidate]:
     """Runs that fit and of which none that fits is better in one objective without being worse in another."""
     fitting = [c for c in ranked if c.fits]
     ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), len(select.objectives))

@@ -6,7 +6,7 @@ from pydantic import Field
 
 from ...inputs.part import Part
 from ...inputs.quantities import Switch
-from ...sizing.axis_task.bound import Bound
+from ...sizing.axis_task.column_bounds import Bound
 from ...sizing.finding import RULES, TASK_RULES
 
 Direction = Literal["least", "largest"]

@@ -11,8 +11,8 @@ from pydantic import BaseModel, Field, model_validator
 
 from ...data_sheets.train_components import RECORDS
 from ...errors import InputError
-from ...inputs.kept import kept
-from ...inputs.named import Named
+from ...inputs.cached_values import kept
+from ...inputs.named_elements import Named
 from ...inputs.part import Part
 from ...inputs.quantities import Switch
 from ...inputs.validation import shown

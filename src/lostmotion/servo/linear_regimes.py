@@ -12,7 +12,7 @@ import numpy as np
 from .. import _core
 from ..control.axis import core_control
 from ..control.controller import Controller
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear

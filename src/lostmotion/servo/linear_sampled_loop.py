@@ -18,18 +18,18 @@ import numpy as np
 from .. import _core
 from ..errors import InputError
 from ..response.linear import LinearModel
-from .regimes import Axis, Regime
+from .linear_regimes import Axis, Regime
 
 INPUTS = ("reference", "rate", "acceleration", "measured")
 """of a loop: its reference with two derivatives, and what takes the place of its measured value where it is cut"""
 CURRENTS = {"direct current": _core.CurrentAxis.direct, "current": _core.CurrentAxis.quadrature}
 """loops of field-oriented control, of i_d and of i_q, the other one closed"""
 
-Row = np.ndarray  # a signal as a linear form over the state at a tick, and the inputs
+LinearForm = np.ndarray  # a signal as a linear form over the state at a tick, and the inputs
 
 
 @dataclass(frozen=True)
-class SampledLoop:
+class LinearLoop:
     """One loop of an axis with the loops within it, in one regime of the plant; the loops around it are open.
 
     The loop is cut where its measured value enters its controller, or closed.
@@ -76,7 +76,7 @@ class SampledLoop:
     # --- matrices of each tick ---
 
     @cached_property
-    def ticks(self) -> list[tuple[np.ndarray, np.ndarray, dict[str, Row]]]:
+    def ticks(self) -> list[tuple[np.ndarray, np.ndarray, dict[str, LinearForm]]]:
         """Matrices of each sample instant: state to state, inputs to state, and the signals."""
         first = self.axis.law[0].position_phase if self.loop == "position" else 0
         ticks = [self._tick(first + k) for k in range(self.every(self.loop))]
@@ -95,7 +95,7 @@ class SampledLoop:
         """With the currents of a winding."""
         return len(self.model.states) + (0 if self.regime.winding is None else 2)
 
-    def _tick(self, tick: int) -> tuple[np.ndarray, np.ndarray, dict[str, Row]]:
+    def _tick(self, tick: int) -> tuple[np.ndarray, np.ndarray, dict[str, LinearForm]]:
         law, position_shaft, speed_shaft = self.axis.law
         winding, motor, loop = self.regime.winding, self.axis.motor, self.loop
         oriented = CURRENTS.get(loop) if winding is not None else None
@@ -135,7 +135,7 @@ class SampledLoop:
         whole = np.vstack([over_tick @ np.vstack([plant, acting]), after, own])
         return whole[:, : -len(INPUTS)], whole[:, -len(INPUTS) :], rows
 
-    def _output(self, name: str, plant: np.ndarray) -> Row:
+    def _output(self, name: str, plant: np.ndarray) -> LinearForm:
         """A variable of the plant that the command does not act on at once."""
         m = self.model
         if name not in m.outputs:

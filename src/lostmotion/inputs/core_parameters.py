@@ -1,8 +1,8 @@
 """The parameters of parts as the core describes them: keys, units, ranges, defaults and meanings.
 
 What a part in `model` and `control` adds to them is what the core does not see, such as what must fit together. ``NameFields``
-is the base of the part `Name`. It is made when its name is first used: write ``described.NameFields`` in a class whose
-tables are parts of the same module. The names for type checkers are in `described.pyi`, which ``make stub`` writes.
+is the base of the part `Name`. It is made when its name is first used: write ``core_parameters.NameFields`` in a class whose
+tables are parts of the same module. The names for type checkers are in `core_parameters.pyi`, which ``make stub`` writes.
 Keys that the core does not take are fields of the parts themselves.
 """
 
@@ -19,7 +19,7 @@ V = TypeVar("V")  # the value of a signal, with its unit
 OF_VALUE = "value"  # unit of the value of a signal
 TYPES = {"pair": "tuple[float, float]", "integer": "int", "flag": "bool", "list": "tuple[float, ...]"}
 
-Row = tuple[Any, ...]  # key, kind, symbol, unit, meaning, range, whether it is needed, default, and more
+ParameterRow = tuple[Any, ...]  # key, kind, symbol, unit, meaning, range, whether it is needed, default, and more
 
 
 class Described(Part):
@@ -62,7 +62,7 @@ def _type(kind: str, unit: str, limits: tuple[float | None, float | None, float 
     return tuple[number, number] if kind == "pair" else number
 
 
-def _part(name: str, rows: list[Row]) -> type[Described]:
+def _part(name: str, rows: list[ParameterRow]) -> type[Described]:
     fields: dict[str, Any] = {}
     for row in rows:
         key, kind, _, unit, meaning, limits, needed, default, more = row
@@ -77,11 +77,11 @@ def _part(name: str, rows: list[Row]) -> type[Described]:
     return part
 
 
-def _is_of_value(rows: list[Row]) -> bool:
+def _is_of_value(rows: list[ParameterRow]) -> bool:
     return any(row[3] == OF_VALUE for row in rows)
 
 
-OF_CORE: dict[str, list[Row]] = _core.described_tables(of_core=True)
+OF_CORE: dict[str, list[ParameterRow]] = _core.described_tables(of_core=True)
 TABLES = OF_CORE | _core.described_tables(of_core=False)  # rows of the parameters of each part
 
 
@@ -106,7 +106,7 @@ def _reference_blocks() -> type[Part]:
 ReferenceBlocks = _reference_blocks()
 
 
-def _stub_type(row: Row) -> str:
+def _stub_type(row: ParameterRow) -> str:
     _, kind, _, unit, _, _, _, _, more = row
     if kind == "table":
         return str(more[0])
@@ -114,7 +114,7 @@ def _stub_type(row: Row) -> str:
 
 
 def stub() -> str:
-    """The text of `described.pyi`."""
+    """The text of `core_parameters.pyi`."""
     inner = {row[8][0] for rows in TABLES.values() for row in rows if row[1] == "table"}
     homes: dict[str, list[str]] = {}
     for name in sorted(inner):

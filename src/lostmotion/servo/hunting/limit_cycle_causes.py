@@ -17,8 +17,8 @@ from ...model.torsion import TorsionCurve
 from ...response.closed_loop import slowest
 from ...simulation.scenario.scenario import Scenario
 from ..axis_runs import changed, first_size, pole_named, step_duration, with_controller
-from ..regimes import Axis
-from .standstill import Verdict, Watch, decide, moving_input
+from ..linear_regimes import Axis
+from .hunting_decision import Verdict, WatchedRun, decide, moving_input
 
 PART = 0.5  # of the amplitude, below which leaving something out takes a limit cycle away
 REST = 10.0  # of the slowest time constants of the loops, for which an axis is watched at least
@@ -125,7 +125,7 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
         return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
     first = max(watched_at_least(axis), axis.scenario.simulation.duration)
     with pole_named(axis):
-        watch = Watch(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
+        watch = WatchedRun(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
         found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
     motor, load = 0.5 * found.swing
     ends = (float(found.range[0, 1]), float(found.range[1, 1]))

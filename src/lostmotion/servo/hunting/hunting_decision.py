@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...control.turning import turns
+from ...control.shaft_ratio import turns
 from ...response.closed_loop import running_slots
 from ...response.closed_response import frame_of
 from ...simulation.runs.stuck_contacts import explain
@@ -87,7 +87,7 @@ class _Look:
     creep: float  # speed of contacts that slip by no more than rounding [rad/s]
 
 
-class Watch:
+class WatchedRun:
     """A scenario from the instant on at which its inputs have come to rest."""
 
     def __init__(self, scenario: Scenario, names: Sequence[str]) -> None:
@@ -361,7 +361,7 @@ class Decision:
         return np.asarray(self.range[1] - self.range[0])
 
 
-def decide(watch: Watch, first: float, most: float) -> Decision:
+def decide(watch: WatchedRun, first: float, most: float) -> Decision:
     """Watches a loop until it is shown to be at rest, or to swing on.
 
     first: shortest time to watch [s].
@@ -397,7 +397,7 @@ def decide(watch: Watch, first: float, most: float) -> Decision:
     return _decision(watch, "not decided", _why(watch, outlook))
 
 
-def _decision(watch: Watch, verdict: Verdict, reason: str) -> Decision:
+def _decision(watch: WatchedRun, verdict: Verdict, reason: str) -> Decision:
     swing, watched, frequency = watch.swing(0.75, 1.0), watch.elapsed, math.nan
     if verdict == "hunts":
         moving = int(np.argmax(swing > watch.noise))
@@ -408,7 +408,7 @@ def _decision(watch: Watch, verdict: Verdict, reason: str) -> Decision:
     return Decision(verdict, reason, watched, frequency, ends)
 
 
-def _why(watch: Watch, outlook: Outlook) -> str:
+def _why(watch: WatchedRun, outlook: Outlook) -> str:
     if text := outlook.describe():
         return text
     before, last = watch.swing(0.5, 0.75), watch.swing(0.75, 1.0)
