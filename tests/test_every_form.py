@@ -71,7 +71,7 @@ def rig_of(scenario: lm.Scenario, path: Path, **more: Any) -> tuple[Rig, list[Pr
     key = next(inertias(long))
     value = lm.simulation.runs.sensitivities.value_at(long, key)
     start = {"start": 1.02 * value, "min": 0.5 * value, "max": 2.0 * value}
-    speed = long.train().speed_of(list(long.train().shafts)[-1])
+    speed = long.train().variable(list(long.train().shafts)[-1], "speed")
     task = Identification(
         scenario="rig.toml",
         logs={"files": ["*.csv"]},
@@ -296,7 +296,7 @@ def test_no_function_refuses_a_random_scenario_by_its_form(seed: int, tmp_path: 
         assert refusals(long, tmp_path / "long", QUICKEST) == []
         own, other = lm.simulate(scenario), lm.simulate(long)
         for shaft in long.train().shafts:
-            speed = scenario.train().speed_of(shaft), long.train().speed_of(shaft)
+            speed = scenario.train().variable(shaft, "speed"), long.train().variable(shaft, "speed")
             assert np.array_equal(own[speed[0]], other[speed[1]])
 
 

@@ -33,13 +33,13 @@ def test_names_of_variables_are_those_of_the_core(path: Path) -> None:
     scenario = lm.load(path)
     train, core = scenario.train(), scenario.core()
     named = {name for name, *_ in core.channels()}
-    assert {train.speed_of(shaft) for shaft in train.shafts} <= named
-    assert {train.motor_torque_of(motor) for motor in train.motors} <= named
+    assert {train.variable(shaft, "speed") for shaft in train.shafts} <= named
+    assert {train.variable(motor, "torque") for motor in train.motors} <= named
     for gear in train.gears:
-        assert {train.output_torque_of(gear), train.input_torque_of(gear)} <= named
+        assert {train.variable(gear, "output_torque"), train.variable(gear, "input_torque")} <= named
     assert set(core.input_names()) <= set(scenario.signals())
-    assert {train.command_of(motor) for motor in train.motors} <= named | set(scenario.signals())
-    assert set(scenario.input_keys()) >= {train.load_torque_of(shaft) for shaft in train.shafts}
+    assert {train.variable(motor, "command") for motor in train.motors} <= named | set(scenario.signals())
+    assert set(scenario.input_keys()) >= {train.variable(shaft, "load_torque") for shaft in train.shafts}
 
 
 def test_units_are_converted_to_si(small: Path) -> None:

@@ -133,8 +133,8 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
 
 def _signal_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
     keys, train = scenario.input_keys(), scenario.train()
-    turned = {keys[train.command_of(motor)] for motor in (*scenario.axes(), *scenario.continuous())}
-    loads = {train.load_torque_of(shaft): shaft for shaft in train.shafts}
+    turned = {keys[train.variable(motor, "command")] for motor in (*scenario.axes(), *scenario.continuous())}
+    loads = {train.variable(shaft, "load_torque"): shaft for shaft in train.shafts}
     shafts = {keys[name]: shaft for name, shaft in loads.items() if name in keys}
     duration = scenario.simulation.duration
     for number, (key, signal) in enumerate(_inputs(scenario)):

@@ -22,9 +22,9 @@ def drawn(scenario: Scenario) -> dict[str, Any]:
     shafts = [
         {
             "name": n,
-            "speed": train.speed_of(n),
-            "angle": known(train.angle_of(n)),
-            "contact": known(train.contact_of(n)),
+            "speed": train.variable(n, "speed"),
+            "angle": known(train.variable(n, "angle")),
+            "contact": known(train.variable(n, "contact")),
             "motor": n in with_motor,
             "slide": train.is_slide(n),
         }
@@ -36,8 +36,8 @@ def drawn(scenario: Scenario) -> dict[str, Any]:
             "input": g.input,
             "output": g.output,
             "fixed": g.housing is None,
-            "twist": None if isinstance(g.stiffness, Rigid) else known(train.twist_of(n)),
-            "output_torque": train.output_torque_of(n),
+            "twist": None if isinstance(g.stiffness, Rigid) else known(train.variable(n, "twist")),
+            "output_torque": train.variable(n, "output_torque"),
             **_laws(g),
         }
         for n, g in train.gears.items()
@@ -46,15 +46,15 @@ def drawn(scenario: Scenario) -> dict[str, Any]:
         {
             "name": n,
             "shaft": m.shaft,
-            "torque": train.motor_torque_of(n),
-            "command": None if m.kind == "stepper" else known(train.command_of(n)),
+            "torque": train.variable(n, "torque"),
+            "command": None if m.kind == "stepper" else known(train.variable(n, "command")),
         }
         for n, m in train.motors.items()
     ]
-    twists = {f"{train.twist_of(n)}_contact": n for n in train.gears}
+    twists = {train.variable(n, "twist_contact"): n for n in train.gears}
     rigid = {contact for contact, n in twists.items() if isinstance(train.gears[n].stiffness, Rigid)}
-    labels = {train.contact_of(n): n for n in train.shafts} | {c: f"{n} twist" for c, n in twists.items()}
-    sliding = {train.contact_of(n) for n in train.shafts if train.is_slide(n)}
+    labels = {train.variable(n, "contact"): n for n in train.shafts} | {c: f"{n} twist" for c, n in twists.items()}
+    sliding = {train.variable(n, "contact") for n in train.shafts if train.is_slide(n)}
     sliding |= {contact for contact, n in twists.items() if train.is_slide(train.gears[n].output)}
     labels |= {contact: contact.removesuffix("_contact") for contact in sliding}
     return {
@@ -74,9 +74,9 @@ def stepper_figures(scenario: Scenario) -> list[dict[str, Any]]:
     train = scenario.train()
     steppers = [name for name, motor in train.motors.items() if motor.kind == "stepper"]
     series = {
-        "Field": [{"variable": train.command_of(n), "label": n} for n in steppers],
+        "Field": [{"variable": train.variable(n, "command"), "label": n} for n in steppers],
         "Field before the rotor, electrical angle": [
-            {"variable": f"{n}_electrical_angle", "label": n} for n in steppers
+            {"variable": train.variable(n, "electrical_angle"), "label": n} for n in steppers
         ],
     }
     return [{"title": title, "unit": "rad", "series": lines} for title, lines in series.items() if lines]

@@ -110,6 +110,12 @@ ON_SHAFTS = {table: getattr(part, "table_of_core", table) for table, part in _ta
 COUPLINGS = tuple(table for table, _ in _tables_of("input", "output", without=Gear))
 
 
+# Quantities of gears, whose names follow the shaft that they act on,
+# and those of the sampled controllers of motors, the same in every domain.
+OF_GEARS = ("twist", "twist_contact", "hysteresis_capacity", "output_torque", "input_torque")
+OF_CONTROLLERS = {"reference", *(name for name, *_ in (*_core.axis_signals(), *_core.winding_signals()))}
+
+
 class DriveTrain(TrainElements):
     """A drive train: shafts, gears, clutches and dampers between them, motors, brakes and torques over angle.
 
@@ -156,67 +162,44 @@ class DriveTrain(TrainElements):
         """The name that an entry of results has; empty: it is not shown."""
         return self.aliases.get(name, name)
 
-    def _named(self, element: str, what: str, shaft: str) -> str:
-        return self.shown(_core.result_name(element, what, self.is_slide(shaft)))
+    def variable(self, element: str, quantity: str) -> str:
+        """The name that a quantity of an element has in results, such as `angle` of a shaft: NAME_angle, of a slide NAME_position."""
+        if quantity in OF_CONTROLLERS:
+            return self.shown(f"{element}_") + quantity
+        name = _core.result_name(element, quantity, self._is_linear(element, quantity))
+        return self.shown(name) or name
 
-    def angle_of(self, shaft: str) -> str:
-        """NAME_angle of a shaft, NAME_position of a slide."""
-        return _core.result_name(shaft, "angle", self.is_slide(shaft))
+    def shaft_of(self, variable: str, *quantities: str) -> str:
+        """The shaft whose quantity, one of these, has this name in results; empty: there is none."""
+        return next((s for s in self.shafts if any(self.variable(s, q) == variable for q in quantities)), "")
 
-    def speed_of(self, shaft: str) -> str:
-        """NAME_speed."""
-        return self._named(shaft, "speed", shaft)
-
-    def contact_of(self, shaft: str) -> str:
-        """NAME_contact of the friction on a shaft."""
-        return self._named(shaft, "contact", shaft)
-
-    def command_of(self, name: str) -> str:
-        """NAME_command of a motor, a brake or a clutch."""
-        return self.shown(_core.result_name(name, "command", False))
-
-    def load_torque_of(self, shaft: str) -> str:
-        """NAME_load_torque of a shaft, NAME_load_force of a slide."""
-        return self._named(shaft, "load_torque", shaft)
-
-    def motor_torque_of(self, motor: str) -> str:
-        """NAME_torque, NAME_force of a linear motor."""
-        return self._named(motor, "torque", self.motors[motor].shaft)
-
-    def twist_of(self, gear: str) -> str:
-        """NAME_twist of a gear, NAME_deflection of what moves a slide."""
-        return self._named(gear, "twist", self.gears[gear].output)
-
-    def twist_contact_of(self, gear: str) -> str:
-        """NAME_twist_contact of a gear with hysteresis or damping."""
-        return self._named(gear, "twist_contact", self.gears[gear].output)
-
-    def capacity_of(self, gear: str) -> str:
-        """NAME_hysteresis_capacity of a gear."""
-        return self._named(gear, "hysteresis_capacity", self.gears[gear].output)
-
-    def output_torque_of(self, gear: str) -> str:
-        """NAME_output_torque of a gear, NAME_output_force of what moves a slide."""
-        return self._named(gear, "output_torque", self.gears[gear].output)
-
-    def input_torque_of(self, gear: str) -> str:
-        """NAME_input_torque of a gear."""
-        return self._named(gear, "input_torque", self.gears[gear].input)
-
-    def stop_torque_of(self, shaft: str) -> str:
-        """NAME_end_stop_torque of a shaft with end stops, NAME_end_stop_force of a slide."""
-        return _core.result_name(shaft + END_STOP, "torque", self.is_slide(shaft))
+    def _is_linear(self, element: str, quantity: str) -> bool:
+        """Whether a quantity is one of translation: a torque is a force, and so on."""
+        shaft = element.removesuffix(END_STOP)
+        if quantity in OF_GEARS and element in self.gears:
+            shaft = self.gears[element].input if quantity == "input_torque" else self.gears[element].output
+        elif quantity == "torque" and element in self.motors:
+            shaft = self.motors[element].shaft
+        return shaft in self.shafts and self.is_slide(shaft)
 
     def flanks(self) -> dict[str, tuple[str, float, float]]:
         """Contacts that touch or part, where others stick or slip: what moves between them, and its least and largest value."""
         found = {
-            self.twist_contact_of(name): (self.twist_of(name), -0.5 * law.backlash, 0.5 * law.backlash)
+            self.variable(name, "twist_contact"): (
+                self.variable(name, "twist"),
+                -0.5 * law.backlash,
+                0.5 * law.backlash,
+            )
             for name, law in ((name, gear.stiffness) for name, gear in self.gears.items())
             if isinstance(law, Rigid) and law.strikes
         }
         for name, shaft in self.shafts.items():
             if (stops := shaft.end_stops) is not None and stops.stiffness is None:
-                found[f"{name}{END_STOP}_contact"] = (self.angle_of(name), stops.lower, stops.upper)
+                found[self.variable(name + END_STOP, "contact")] = (
+                    self.variable(name, "angle"),
+                    stops.lower,
+                    stops.upper,
+                )
         return found
 
     def torque_word(self, shaft: str) -> str:

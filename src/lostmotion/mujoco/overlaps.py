@@ -54,7 +54,7 @@ def loads_of(drive: Scenario) -> list[str]:
     """Keys of the load torques of a scenario."""
     train = drive.train()
     return [
-        drive.input_key(train.load_torque_of(shaft))
+        drive.input_key(train.variable(shaft, "load_torque"))
         for shaft, signal in drive.tables.loads().items()
         if signal != type(signal)()
     ]

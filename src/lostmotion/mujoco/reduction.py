@@ -148,10 +148,10 @@ def _along_sines(
     made = joint_drive("joint", train, inertia, step)
     simulation, ratios = made.simulation, made.ratios()
     ((name, motor),) = train.motors.items()
-    ratio, command, load = ratios[motor.shaft], train.command_of(name), train.load_torque_of(joint)
+    ratio, command, load = ratios[motor.shaft], train.variable(name, "command"), train.variable(joint, "load_torque")
     if ratio == 0.0:
         raise InputError(f"no fixed ratio leads from the motor {name} to the shaft {joint}; join them by gears")
-    motor_angle, motor_turns = train.angle_of(motor.shaft), train.speed_of(motor.shaft)
+    motor_angle, motor_turns = train.variable(motor.shaft, "angle"), train.variable(motor.shaft, "speed")
     omega = 2.0 * math.pi * frequency
     bandwidth = 20.0 * omega
     if made.mesh_frequency > 0.0:
@@ -174,16 +174,16 @@ def _along_sines(
             a += size * w * w * math.cos(w * t)
         # By the motor's own angle and speed, which holds a compliant gear in check.
         angle, motor_speed = simulation[motor_angle] / ratio, simulation[motor_turns] / ratio
-        speed = simulation[train.speed_of(joint)]
+        speed = simulation[train.variable(joint, "speed")]
         wanted = whole * (a + 2.0 * bandwidth * (v - motor_speed) + bandwidth * bandwidth * (q - angle))
         torque = (wanted + load_torque + math.copysign(friction, v)) / ratio
         simulation.advance(step, **{command: torque / motor.rated_torque, load: load_torque})
-        after = simulation[train.speed_of(joint)]
+        after = simulation[train.variable(joint, "speed")]
         if k >= 2 * STEPS_PER_PERIOD:
             mean, acceleration = 0.5 * (speed + after), (after - speed) / step
             rows.append((torque, -acceleration, -mean, -float(np.sign(mean))))
             targets.append(inertia * acceleration + load_torque)
-    if abs(simulation[train.angle_of(joint)] - q) > 0.5 * amplitude:
+    if abs(simulation[train.variable(joint, "angle")] - q) > 0.5 * amplitude:
         raise InputError(
             "the joint does not follow the motion; give a larger amplitude, or a load torque that it can move"
         )

@@ -370,8 +370,8 @@ def _errors(scenario: Scenario, result: RunArrays) -> OneRun:
             shaft = pointed(scenario)[motor][1]
             ratio = turns(train, train.motors[motor].shaft, shaft)
             assert ratio is not None
-            counted = result[train.command_of(motor)] / ratio
-            place = result[train.angle_of(shaft)]
+            counted = result[train.variable(motor, "command")] / ratio
+            place = result[train.variable(shaft, "angle")]
             measured[motor] = place - place[0] - (counted - counted[0])
             continue
         controller = scenario.axes()[motor]

@@ -74,7 +74,7 @@ def _microsteps(data: Tables) -> None:
     scenario = Scenario(**data)
     for motor, command in data.get("command", {}).items():
         for stepping in _of_steppers({"command": {motor: command}}):
-            field = scenario.signals()[scenario.train().command_of(motor)]
+            field = scenario.signals()[scenario.train().variable(motor, "command")]
             made, given = len(field.breakpoint_list()), stepping.get("microsteps", 1)
             own = given
             while (2 * made <= FINE or own < 4 * given) and 2 * own <= MOST_MICROSTEPS:

@@ -20,22 +20,28 @@ def dependencies_of(scenario: Scenario, states: Collection[str], inputs: Collect
     equations = _Equations(scenario, train)
     known = [*inputs, *states]
     found: dict[str, set[str]] = {name: set() for name in equations.moving}
-    angles = {name for shaft in train.shafts if (name := train.angle_of(shaft)) in states}
-    twists = {train.twist_of(gear) for gear in train.gears}
+    angles = {name for shaft in train.shafts if (name := train.variable(shaft, "angle")) in states}
+    twists = {train.variable(gear, "twist") for gear in train.gears}
     for shaft in train.shafts:
-        angle = train.angle_of(shaft)
-        found |= {f"der({angle})": {train.speed_of(shaft)}, f"der({train.speed_of(shaft)})": equations.of([shaft])}
+        angle = train.variable(shaft, "angle")
+        found |= {
+            f"der({angle})": {train.variable(shaft, "speed")},
+            f"der({train.variable(shaft, 'speed')})": equations.of([shaft]),
+        }
         found.setdefault(angle, angles | twists)
-        found.setdefault(train.speed_of(shaft), equations.of([shaft]))
-        found[f"{train.contact_of(shaft)}_{train.torque_word(shaft)}"] = equations.of([shaft])
+        found.setdefault(train.variable(shaft, "speed"), equations.of([shaft]))
+        found[train.variable(shaft, "contact_torque")] = equations.of([shaft])
     for name, motor in train.motors.items():
-        torque, of_motor = train.motor_torque_of(name), {train.command_of(name), train.speed_of(motor.shaft)}
+        torque, of_motor = (
+            train.variable(name, "torque"),
+            {train.variable(name, "command"), train.variable(motor.shaft, "speed")},
+        )
         found[f"der({torque})"] = of_motor | {torque}
         found.setdefault(torque, of_motor)
     for name, gear in train.gears.items():
         ends = [gear.input, gear.output, *filter(None, [gear.housing])]
-        found[f"der({train.twist_of(name)})"] = set().union(*(equations.speeds(shaft) for shaft in ends))
-        found[train.output_torque_of(name)] = found[train.input_torque_of(name)] = equations.of(ends)
+        found[f"der({train.variable(name, 'twist')})"] = set().union(*(equations.speeds(shaft) for shaft in ends))
+        found[train.variable(name, "output_torque")] = found[train.variable(name, "input_torque")] = equations.of(ends)
     return {name: [k for k in known if k in needed] for name, needed in found.items()}
 
 
@@ -48,8 +54,8 @@ class _Equations:
         self._group = {shaft: {shaft} for shaft in train.shafts}
         contacts = scenario.core().contact_names()
         for name, gear in train.gears.items():
-            twist = train.twist_of(name)
-            if twist not in self.moving or train.twist_contact_of(name) in contacts:
+            twist = train.variable(name, "twist")
+            if twist not in self.moving or train.variable(name, "twist_contact") in contacts:
                 self._join(gear.input, gear.output, *filter(None, [gear.housing]))
         for one, other, _ in (*train.held_together(), *train.inertia_couplings()):
             self._join(one, other)
@@ -69,30 +75,34 @@ class _Equations:
 
     def speeds(self, shaft: str) -> set[str]:
         """Numbers that the speed of a shaft depends on: itself, or without inertia the balance of torques."""
-        return {self._train.speed_of(shaft)} if self._train.speed_of(shaft) in self.moving else self.of([shaft])
+        return (
+            {self._train.variable(shaft, "speed")}
+            if self._train.variable(shaft, "speed") in self.moving
+            else self.of([shaft])
+        )
 
     def of(self, shafts: Collection[str]) -> set[str]:
         """All that acts on these shafts, and on those that move with them."""
         train, group = self._train, set().union(*(self._group[shaft] for shaft in shafts))
-        found = {train.load_torque_of(shaft) for shaft in group}
+        found = {train.variable(shaft, "load_torque") for shaft in group}
         for others in self._beside():
             if not group.isdisjoint(others):
-                found |= {train.speed_of(shaft) for shaft in others}
-        found |= {train.speed_of(shaft) for shaft in group}
+                found |= {train.variable(shaft, "speed") for shaft in others}
+        found |= {train.variable(shaft, "speed") for shaft in group}
         for name, motor in train.motors.items():
             if motor.shaft in group:
-                torque = train.motor_torque_of(name)
-                found |= {torque} if torque in self.moving else {train.command_of(name)}
+                torque = train.variable(name, "torque")
+                found |= {torque} if torque in self.moving else {train.variable(name, "command")}
         for name, gear in train.gears.items():
             if not group.isdisjoint([gear.input, gear.output, gear.housing]):
-                found |= {train.twist_of(name), train.angle_of(gear.input)}
-                found |= set() if gear.housing is None else {train.angle_of(gear.housing)}
+                found |= {train.variable(name, "twist"), train.variable(gear.input, "angle")}
+                found |= set() if gear.housing is None else {train.variable(gear.housing, "angle")}
         for table in ON_SHAFTS:
             on_shafts: Mapping[str, object] = getattr(train, table)
             for name, element in on_shafts.items():
                 if (shaft := str(getattr(element, "shaft", ""))) in group:
-                    found |= {train.angle_of(shaft), train.command_of(name)}
+                    found |= {train.variable(shaft, "angle"), train.variable(name, "command")}
         for name, clutch in train.clutches.items():
             if not group.isdisjoint([clutch.input, clutch.output]):
-                found.add(train.command_of(name))
+                found.add(train.variable(name, "command"))
         return found

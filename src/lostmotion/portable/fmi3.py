@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import repeat
 from xml.etree import ElementTree as ET
 
+from ..model.train import DriveTrain
 from .fmu_model import (
     FIRST_DERIVATIVE,
     FIRST_INDICATOR,
@@ -114,7 +115,7 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
         add(p.key, FIRST_PARAMETER + k, parameter_meaning(p), p.unit, **kind)
 
 
-def terminals(model: Model) -> bytes:
+def terminals(train: DriveTrain, model: Model) -> bytes:
     """terminalsAndIcons.xml: a terminal for each shaft or slide that a load acts on, and one for all commands and references."""
     root = ET.Element("fmiTerminalsAndIcons", fmiVersion="3.0")
     graphics = ET.SubElement(root, "GraphicalRepresentation")
@@ -123,16 +124,14 @@ def terminals(model: Model) -> bytes:
     ET.SubElement(graphics, "Icon", corners)
     listed = ET.SubElement(root, "Terminals")
     outputs = {v.name for v in model.outputs}
-    loads = [v.name for v in model.inputs if v.name.endswith(("load_torque", "_load_force"))]
-    for load in loads:
-        if load.endswith("_load_force"):
-            slide = load.removesuffix("_load_force")
-            members = {"force": load} | {m: f"{slide}_{m}" for m in ("speed", "position") if f"{slide}_{m}" in outputs}
-            _add_terminal(listed, f"{slide}_slide", members)
-            continue
-        shaft = load.removesuffix("_load_torque") if load != "load_torque" else "load"
-        members = {"torque": load} | {m: f"{shaft}_{m}" for m in ("speed", "angle") if f"{shaft}_{m}" in outputs}
-        _add_terminal(listed, f"{shaft}_shaft", members)
+    loads = {v.name: shaft for v in model.inputs if (shaft := train.shaft_of(v.name, "load_torque"))}
+    for load, shaft in loads.items():
+        slide = train.is_slide(shaft)
+        moved = {
+            m: train.variable(shaft, of) for m, of in (("speed", "speed"), ("position" if slide else "angle", "angle"))
+        }
+        members = {train.torque_word(shaft): load} | {m: v for m, v in moved.items() if v in outputs}
+        _add_terminal(listed, f"{shaft}_{'slide' if slide else 'shaft'}", members)
     if signals := {v.name: v.name for v in model.inputs if v.name not in loads}:
         _add_terminal(listed, "commands", signals)
     if not len(listed):

@@ -159,7 +159,7 @@ def export_fmu(
             if fmi == 2:
                 archive.writestr("model.png", icon)
             else:
-                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", fmi3.terminals(model))
+                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", fmi3.terminals(scenario.train(), model))
                 archive.writestr("terminalsAndIcons/icon.png", icon)
             for name, content in binaries.items():
                 archive.writestr(f"binaries/{name}", content)
@@ -195,7 +195,7 @@ def _with_given(scenario: Scenario, names: Sequence[str]) -> Scenario:
         if name in scenario.given():
             continue
         table = "slides" if name in scenario.slides else "shafts"
-        changes[f"{table}.{name}.speed"] = {"mean": start.get(scenario.train().speed_of(name), 0.0)}
+        changes[f"{table}.{name}.speed"] = {"mean": start.get(scenario.train().variable(name, "speed"), 0.0)}
         for key in ("speeds", "slide_speeds"):
             own = changes.get(f"initial.{key}", getattr(scenario.initial, key))
             changes[f"initial.{key}"] = {shaft: speed for shaft, speed in own.items() if shaft != name}
@@ -250,19 +250,19 @@ def _model(
     """Content of modelDescription.xml."""
     core, signals, axes = scenario.core(), scenario.signals(), scenario.by_prefix()
     shown = {v.name for v in axis_variables(axes)}
-    controlled = {f"{prefix}command" for prefix in axes}
+    train, start = scenario.train(), scenario.start()
+    controlled = {train.variable(motor, "command") for motor in scenario.axes()}
     names, variables = core.input_names(), variables_of(scenario)
     sizes, states = _sizes(scenario)
     inputs = [name for name in names if name not in controlled]
     # From tick to tick, or from one switching to the next. Where there is no contact, its variable follows a sign.
     held = controlled | shown | set(core.contact_names())
     by_name = {v.name: Declared(v.name, v.unit, v.meaning, sizes.get(v.name, 0.0), v.name in held) for v in variables}
-    train, start = scenario.train(), scenario.start()
     for shaft in scenario.given():
-        by_name |= {v.name: v for v in _given_motion(shaft, slide=train.is_slide(shaft))}
+        by_name |= {v.name: v for v in _given_motion(train, shaft)}
     positions = _positions(train, motions, by_name)
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
-    given = {f"{prefix}reference": c for prefix, c in axes.items() if references_given}
+    given = {train.variable(motor, "reference"): c for motor, c in scenario.axes().items() if references_given}
     references = [
         Declared(name, *_reference(scenario, name.removesuffix("reference"), c.reference.kind), 0.0)
         for name, c in given.items()
@@ -277,7 +277,7 @@ def _model(
             for v in (
                 *(by_name[name] for name in inputs),
                 *references,
-                *(_given_position(shaft, slide=train.is_slide(shaft)) for shaft in positions),
+                *(_given_position(train, shaft) for shaft in positions),
             )
         ],
         starts=[
@@ -302,7 +302,7 @@ def _model(
 
 def _positions(train: DriveTrain, shafts: Sequence[str], variables: Mapping[str, Declared]) -> dict[str, str]:
     """The variables of the positions of these shafts."""
-    found = {shaft: train.angle_of(shaft) for shaft in shafts}
+    found = {shaft: train.variable(shaft, "angle") for shaft in shafts}
     for shaft, name in found.items():
         if name not in variables:
             raise InputError(
@@ -311,20 +311,20 @@ def _positions(train: DriveTrain, shafts: Sequence[str], variables: Mapping[str,
     return found
 
 
-def _given_motion(shaft: str, *, slide: bool) -> tuple[Declared, Declared]:
+def _given_motion(train: DriveTrain, shaft: str) -> tuple[Declared, Declared]:
     """The inputs that give the motion of a shaft or a slide."""
-    kind, unit = ("slide", "m/s") if slide else ("shaft", "rad/s")
+    kind, unit = "slide" if train.is_slide(shaft) else "shaft", train.speed_unit(shaft)
+    speed, acceleration = (train.variable(shaft, f"given_{what}") for what in ("speed", "acceleration"))
     return (
-        Declared(f"{shaft}_given_speed", unit, f"speed that the {kind} has at the start of a step", 0.0),
-        Declared(f"{shaft}_given_acceleration", f"{unit}^2", f"acceleration that the {kind} has", 0.0),
+        Declared(speed, unit, f"speed that the {kind} has at the start of a step", 0.0),
+        Declared(acceleration, f"{unit}^2", f"acceleration that the {kind} has", 0.0),
     )
 
 
-def _given_position(shaft: str, *, slide: bool) -> Declared:
+def _given_position(train: DriveTrain, shaft: str) -> Declared:
     """The input that gives its position beside these."""
-    if slide:
-        return Declared(f"{shaft}_given_position", "m", "position that the slide has", 0.0)
-    return Declared(f"{shaft}_given_angle", "rad", "angle that the shaft has", 0.0)
+    meaning = "position that the slide has" if train.is_slide(shaft) else "angle that the shaft has"
+    return Declared(train.variable(shaft, "given_angle"), train.angle_unit(shaft), meaning, 0.0)
 
 
 def _fine(state: Declared) -> Declared:

@@ -402,7 +402,7 @@ def friction_curve(scenario: Scenario, name: str, label: str) -> Curve | None:
 
 def loop_curves(train: DriveTrain, gear: str, table: dict[str, dict[str, np.ndarray]]) -> tuple[Curve, ...]:
     """Torque of a gear over its twist [arcmin] in the first logs, or force over deflection [µm], by the names of the logs."""
-    twist, torque = train.twist_of(gear), train.output_torque_of(gear)
+    twist, torque = train.variable(gear, "twist"), train.variable(gear, "output_torque")
     factor = 1e6 if train.is_slide(train.gears[gear].output) else ARCMIN
     runs = [(log, run) for log, run in table.items() if twist in run and torque in run][:LOOPS]
     return tuple(Curve(_short(log), factor * run[twist], run[torque], look(k)) for k, (log, run) in enumerate(runs))

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import visible
+from ..model.end_stops import END_STOP
 from ..simulation.runs.lost_steps import LostSteps, found_in
 from ..simulation.runs.results import RunArrays, energy_of, recorded_variables, whole
 from ..simulation.runs.sample_means import weights
@@ -48,7 +49,7 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
     ]
     for name in train.motors:
         unit = train.torque_unit(train.motors[name].shaft)
-        lines.append(f"  {titled('motor', name)}: {end_and_peak(train.motor_torque_of(name), unit)}")
+        lines.append(f"  {titled('motor', name)}: {end_and_peak(train.variable(name, 'torque'), unit)}")
     alike: dict[tuple[str, str], list[tuple[float, str]]] = {}  # lines of elements by kind and unit
 
     def element(kind: str, name: str, variable: str, unit: str, more: str) -> None:
@@ -57,18 +58,26 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
         alike.setdefault((kind, unit), []).append((peak, line))
 
     for name in train.shafts:
-        angle, (unit, factor) = train.angle_of(name), charted(train.angle_unit(name))
+        angle, (unit, factor) = train.variable(name, "angle"), charted(train.angle_unit(name))
         at = f"; at {factor * float(np.asarray(result[angle])[-1]):.4g} {unit}" if angle in result else ""
-        element("slide" if train.is_slide(name) else "shaft", name, train.speed_of(name), train.speed_unit(name), at)
+        element(
+            "slide" if train.is_slide(name) else "shaft",
+            name,
+            train.variable(name, "speed"),
+            train.speed_unit(name),
+            at,
+        )
     for name, gear in train.gears.items():
-        twist, unit = train.twist_of(name), train.angle_unit(gear.output)
+        twist, unit = train.variable(name, "twist"), train.angle_unit(gear.output)
         bends = twist.removeprefix(f"{name}_")
         bent = "" if gear.stiffness.kind == "rigid" else f"; {bends} {end_and_peak(twist, unit, small=True)}"
-        element(scenario.kind_of(name), name, train.output_torque_of(name), train.torque_unit(gear.output), bent)
+        element(
+            scenario.kind_of(name), name, train.variable(name, "output_torque"), train.torque_unit(gear.output), bent
+        )
     for name, shaft in train.shafts.items():
         if (stops := shaft.end_stops) is not None:
             more = "" if stops.stiffness is not None else "; between impacts"
-            element("end stop", name, train.stop_torque_of(name), train.torque_unit(name), more)
+            element("end stop", name, train.variable(name + END_STOP, "torque"), train.torque_unit(name), more)
     for (kind, unit), rows in alike.items():
         shown, others = _most(rows)
         lines += shown

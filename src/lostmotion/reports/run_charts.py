@@ -11,6 +11,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.validation import shown
 from ..live_page.scenario_drawing import axis_figures
+from ..model.end_stops import END_STOP
 from ..model.losses import LossMap
 from ..model.train import DriveTrain
 from ..simulation.runs.results import energy_of, scenario_of
@@ -101,19 +102,27 @@ def _elements(result: xarray.Dataset) -> Iterator[Chart]:
     """Commands, speeds, torques, twists and contacts of all elements."""
     scenario = scenario_of(result)
     train = scenario.train()
-    loads = [(train.load_torque_of(name), f"load on {name}", name) for name in scenario.loaded()]
-    outputs = [(train.output_torque_of(name), name, gear.output) for name, gear in train.gears.items()]
-    motors = [(train.motor_torque_of(name), name, motor.shaft) for name, motor in train.motors.items()]
-    twists = [(train.twist_of(n), n, g.output) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
-    stops = [(train.stop_torque_of(name), name, name) for name, shaft in train.shafts.items() if shaft.end_stops]
+    loads = [(train.variable(name, "load_torque"), f"load on {name}", name) for name in scenario.loaded()]
+    outputs = [(train.variable(name, "output_torque"), name, gear.output) for name, gear in train.gears.items()]
+    motors = [(train.variable(name, "torque"), name, motor.shaft) for name, motor in train.motors.items()]
+    twists = [(train.variable(n, "twist"), n, g.output) for n, g in train.gears.items() if g.stiffness.kind != "rigid"]
+    stops = [
+        (train.variable(name + END_STOP, "torque"), name, name)
+        for name, shaft in train.shafts.items()
+        if shaft.end_stops
+    ]
     steppers = [name for name, motor in train.motors.items() if motor.kind == "stepper"]
     wanted: list[tuple[str, str, list[Series]]] = [
-        ("Command", "command [-]", [(train.command_of(n), n, 1.0) for n in scenario.commanded() if n not in steppers]),
-        ("Fields of steppers", "angle [rad]", [(train.command_of(n), n, 1.0) for n in steppers]),
+        (
+            "Command",
+            "command [-]",
+            [(train.variable(n, "command"), n, 1.0) for n in scenario.commanded() if n not in steppers],
+        ),
+        ("Fields of steppers", "angle [rad]", [(train.variable(n, "command"), n, 1.0) for n in steppers]),
         (
             "Field before the rotor",
             "electrical angle [deg]",
-            [(f"{n}_electrical_angle", n, math.degrees(1.0)) for n in steppers],
+            [(train.variable(n, "electrical_angle"), n, math.degrees(1.0)) for n in steppers],
         ),
         *_by_domain(train, "{Torque} of motors", "{torque} [{unit}]", "torque", motors),
         *(_speeds(part.train()) for part in parts_of(scenario)),
@@ -153,7 +162,7 @@ def _by_domain(
 def _between_stops(result: xarray.Dataset, train: DriveTrain, name: str) -> Panel:
     """Position of a slide, or angle of a shaft, with those of its end stops that it comes near."""
     unit, factor = charted(train.angle_unit(name))
-    time, values = result["time"].values, factor * result[train.angle_of(name)].values
+    time, values = result["time"].values, factor * result[train.variable(name, "angle")].values
     low, high = float(values.min()), float(values.max())
     stops: Any = train.shafts[name].end_stops
     near = {
@@ -173,7 +182,7 @@ def _speeds(train: DriveTrain) -> tuple[str, str, list[Series]]:
     last = list(train.shafts)[-1]
     unit, factor = charted(train.speed_unit(last))
     series = [
-        (train.speed_of(name), _in_terms_of(train, name, last, ratio), factor / ratio)
+        (train.variable(name, "speed"), _in_terms_of(train, name, last, ratio), factor / ratio)
         for name, ratio in ratios_to(train, last).items()
     ]
     return f"Speed of {last}", f"speed [{unit}]", series
@@ -218,7 +227,11 @@ def gear_charts(result: xarray.Dataset) -> list[Panel]:
     train = scenario.train()
     found = []
     for name, gear in train.gears.items():
-        twist, torque, speed = train.twist_of(name), train.output_torque_of(name), train.speed_of(gear.input)
+        twist, torque, speed = (
+            train.variable(name, "twist"),
+            train.variable(name, "output_torque"),
+            train.variable(gear.input, "speed"),
+        )
         if gear.stiffness.kind != "rigid" and twist in result and torque in result:
             linear = train.is_slide(gear.output)
             loop = Curve(name, (1e6 if linear else ARCMIN) * result[twist].values, result[torque].values, look(0))

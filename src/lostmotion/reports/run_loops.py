@@ -109,9 +109,11 @@ def _of_axis(result: Any, scenario: Scenario, motor: str) -> LoopErrors | None:
     sampled = scenario.axes().get(motor)
     c: Any = sampled or scenario.continuous()[motor]
     shaft, kind = c.shaft or list(train.shafts)[-1], c.reference.kind
-    value = train.angle_of(shaft) if kind == "position" else train.speed_of(shaft)
+    value = train.variable(shaft, "angle") if kind == "position" else train.variable(shaft, "speed")
     prefix = scenario.prefix(motor)
-    names = [f"{prefix}{kind}_reference", f"{prefix}measured_{kind}"] if sampled else [f"{motor}_reference"]
+    names = [
+        train.variable(motor, x) for x in ((f"{kind}_reference", f"measured_{kind}") if sampled else ("reference",))
+    ]
     if kind == "torque" or any(name not in result for name in (value, *names)):
         return None
     unit = train.angle_unit(shaft) if kind == "position" else train.speed_unit(shaft)

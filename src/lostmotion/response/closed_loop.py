@@ -153,7 +153,7 @@ def under_sine(plant: Plant, source: str, amplitude: float, frequency: float) ->
     assert scenario is not None
     axes = {}
     for motor, controller in scenario.axes().items():
-        name = f"{scenario.prefix(motor)}reference"
+        name = scenario.train().variable(motor, "reference")
         wave = {"amplitude": amplitude, "frequency": frequency} if name == source else {}
         mean = mean_of(controller.reference)
         reference = type(controller.reference).model_validate({"mean": mean, **wave})

@@ -45,7 +45,7 @@ def axis_signals(scenario: Scenario) -> Iterator[AxisSignal]:
     """The variables of the controllers; of windings those that repeat, behind all that the controllers remember."""
 
     def titled(name: str, motor: str) -> str:
-        return f"{scenario.prefix(motor)}{name}"
+        return scenario.train().variable(motor, name)
 
     base, axes = scenario.control({name: Law(_nothing) for name, c in scenario.axes().items() if c.law})
     first, own, winding = 0, len(_core.axis_signals()), _core.winding_signals()
@@ -163,12 +163,14 @@ def _powers(plant: Plant, samples: np.ndarray) -> dict[str, float]:
 
 def _of_train(train: DriveTrain) -> tuple[list[tuple[str, str]], list[tuple[tuple[str, str], tuple[str, str], bool]]]:
     """Torque and speed of the motors, and of the gears at input and output, with whether the output turns no other gear."""
-    motors = [(train.motor_torque_of(name), train.speed_of(motor.shaft)) for name, motor in train.motors.items()]
+    motors = [
+        (train.variable(name, "torque"), train.variable(motor.shaft, "speed")) for name, motor in train.motors.items()
+    ]
     driving = {gear.input for gear in train.gears.values()}
     gears = [
         (
-            (train.input_torque_of(name), train.speed_of(g.input)),
-            (train.output_torque_of(name), train.speed_of(g.output)),
+            (train.variable(name, "input_torque"), train.variable(g.input, "speed")),
+            (train.variable(name, "output_torque"), train.variable(g.output, "speed")),
             g.output not in driving,
         )
         for name, g in train.gears.items()

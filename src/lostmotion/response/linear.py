@@ -315,7 +315,7 @@ def train_model(
     variables = variables_of_core(core.variables())
     if all(gear.transmission_error is None for gear in train.gears.values()):  # else the angles are not linear
         known = np.array([of.get(name, nothing) for name, *_ in core.channels()])
-        angles = {train.angle_of(name) for name in train.shafts}
+        angles = {train.variable(name, "angle") for name in train.shafts}
         following = zip((v.name for v in variables if v.derived), core.derive(known), strict=True)
         of |= {name: row for name, row in following if name in angles}
     whole = np.array(list(of.values()))
@@ -339,7 +339,7 @@ def train_model(
 def _why_several_regimes(train: DriveTrain, core: _core.Train) -> str:
     """Reason for more than one regime of a train; empty if it has one."""
     gears, motors, shafts = train.gears.values(), train.motors.values(), train.shafts.values()
-    rigid = {train.twist_contact_of(name) for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
+    rigid = {train.variable(name, "twist_contact") for name, g in train.gears.items() if isinstance(g.stiffness, Rigid)}
     dry = [name for name in core.contact_names() if name not in rigid]
     limits = any(m.command_limit is not None or m.torque_limit is not None for m in motors)
     curves = any(not isinstance(g.stiffness, Rigid) and not g.stiffness.is_linear for g in gears)

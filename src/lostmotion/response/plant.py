@@ -104,8 +104,9 @@ def plant_or_loop(drive: Drive | Scenario) -> Plant:
     if not what.axes():
         return plant
     axes = what.axes()
-    references = {f"{what.prefix(motor)}reference": c.reference for motor, c in axes.items()}
-    commands = [f"{what.prefix(motor)}command" for motor in axes]
+    train = what.train()
+    references = {train.variable(motor, "reference"): c.reference for motor, c in axes.items()}
+    commands = [train.variable(motor, "command") for motor in axes]
     shown_by = [v for v in axis_variables(what.by_prefix(), what.sliding()) if v.unit != "J"]  # which add up
     first, controller = next(iter(axes.items()))
     measured = {"position": "measured_position", "speed": "measured_speed", "torque": "torque"}[
@@ -125,7 +126,7 @@ def plant_or_loop(drive: Drive | Scenario) -> Plant:
         source=next(iter(references)) if len(references) == 1 else None,
         channels=(*plant.channels, *(v.name for v in own)),
         variables=(*plant.variables, *own),
-        output=what.train().motor_torque_of(first) if measured == "torque" else what.prefix(first) + measured,
+        output=train.variable(first, measured),
         closed=what,
     )
 
@@ -139,19 +140,22 @@ def _plant_of(scenario: Scenario) -> Plant:
     source = None
     if len(train.motors) == 1:
         motor = next(iter(train.motors))
-        source = f"{motor}_reference" if motor in scenario.continuous() else train.command_of(motor)
+        source = train.variable(motor, "reference" if motor in scenario.continuous() else "command")
 
     def start_of(initial: Any) -> dict[str, float]:
         capacities = scenario.capacities(initial).items()
-        return scenario.start(initial) | {train.capacity_of(name): h for name, h in capacities}
+        return scenario.start(initial) | {train.variable(name, "hysteresis_capacity"): h for name, h in capacities}
 
-    floors = {train.speed_of(name): 0.0 for name in train.shafts}
+    floors = {train.variable(name, "speed"): 0.0 for name in train.shafts}
     for name, gear in train.gears.items():
-        floors |= {train.output_torque_of(name): gear.rated_output_torque or 0.0, train.twist_of(name): 0.0}
+        floors |= {
+            train.variable(name, "output_torque"): gear.rated_output_torque or 0.0,
+            train.variable(name, "twist"): 0.0,
+        }
         if gear.rated_input_speed is not None:
             floors |= {
-                train.speed_of(gear.input): gear.rated_input_speed,
-                train.speed_of(gear.output): gear.rated_input_speed / abs(gear.ratio),
+                train.variable(gear.input, "speed"): gear.rated_input_speed,
+                train.variable(gear.output, "speed"): gear.rated_input_speed / abs(gear.ratio),
             }
     return Plant(
         train=train,
@@ -164,8 +168,8 @@ def _plant_of(scenario: Scenario) -> Plant:
         channels=tuple(name for name, *_ in core.channels()),
         variables=scenario.variables(),
         derive=scenario.derive,
-        output=train.speed_of(last),
-        angle=train.angle_of(last),
+        output=train.variable(last, "speed"),
+        angle=train.variable(last, "angle"),
         floors=floors,
         scenario=scenario,
     )

@@ -263,7 +263,7 @@ def _motor(train: DriveTrain, motor: str | None) -> str:
 
 def _of(data: xarray.Dataset, train: DriveTrain, shaft: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, angle and speed of a shaft, or position and speed of a slide."""
-    return data["time"].values, data[train.angle_of(shaft)].values, data[train.speed_of(shaft)].values
+    return data["time"].values, data[train.variable(shaft, "angle")].values, data[train.variable(shaft, "speed")].values
 
 
 def _window(

@@ -169,14 +169,20 @@ def limited(axis: Axis, loop: str, data: RunArrays) -> dict[str, float]:
     c, motor = axis.controller, axis.train.motors[axis.motor]
     found: list[tuple[str, np.ndarray, float]] = []
     if c.speed is not None and c.speed.torque_limit is not None and loop != "current":
-        found.append(("speed.torque_limit", data[f"{axis.motor}_torque_reference"], c.speed.torque_limit))
+        found.append(
+            ("speed.torque_limit", data[axis.train.variable(axis.motor, "torque_reference")], c.speed.torque_limit)
+        )
     if c.position is not None and c.position.speed_limit is not None and loop == "position":
         most = c.position.speed_limit * abs(axis.ratio)
-        found.append(("position.speed_limit", data[f"{axis.motor}_speed_reference"], most))
+        found.append(("position.speed_limit", data[axis.train.variable(axis.motor, "speed_reference")], most))
     if motor.command_limit is not None and isinstance(c.current, CurrentLoop):
-        found.append(("limit of the motor's voltage", data[axis.train.command_of(axis.motor)], motor.command_limit))
+        found.append(
+            ("limit of the motor's voltage", data[axis.train.variable(axis.motor, "command")], motor.command_limit)
+        )
     if motor.torque_limit is not None:
-        found.append(("limit of the motor's torque", data[axis.train.motor_torque_of(axis.motor)], motor.torque_limit))
+        found.append(
+            ("limit of the motor's torque", data[axis.train.variable(axis.motor, "torque")], motor.torque_limit)
+        )
     if isinstance(c.current, FieldOriented) and motor.winding is not None and motor.winding.max_current is not None:
         for what, limit in (("voltage", motor.phase_voltage), ("current", math.sqrt(2.0) * motor.winding.max_current)):
             pair = (data[f"{axis.motor}_{which}_{what}"] for which in ("direct", "quadrature"))
@@ -214,7 +220,7 @@ def following(axis: Axis) -> Following:
     wanted = reference.at(time)[0]
     name, unit = axis.measured[reference.kind]
     if reference.kind == "speed":
-        name, unit = axis.train.speed_of(axis.shaft), axis.train.speed_unit(axis.shaft)
+        name, unit = axis.train.variable(axis.shaft, "speed"), axis.train.speed_unit(axis.shaft)
     error = wanted - data[name]
     rms = math.sqrt(float(np.average(error**2, weights=weights(time))))
     unseen = errors_of(axis, data)[1] if reference.kind == "position" else np.zeros_like(error)
@@ -230,4 +236,4 @@ def errors_of(axis: Axis, data: RunArrays) -> tuple[np.ndarray, np.ndarray]:
     error = axis.controller.reference.at(data["time"])[0] - data[name]
     if encoder == axis.shaft:
         return error, np.zeros_like(error)
-    return error, data[train.angle_of(encoder)] / (turns(train, encoder, axis.shaft) or 1.0) - data[name]
+    return error, data[train.variable(encoder, "angle")] / (turns(train, encoder, axis.shaft) or 1.0) - data[name]

@@ -64,9 +64,9 @@ class Axis:
         """Result variable and unit of what its loops control: torque and speed of the motor, position at the reference's shaft."""
         train = self.train
         return {
-            "torque": (train.motor_torque_of(self.motor), printed(train.torque_unit(self.motor_shaft))),
-            "speed": (train.speed_of(self.motor_shaft), train.speed_unit(self.motor_shaft)),
-            "position": (train.angle_of(self.shaft), train.angle_unit(self.shaft)),
+            "torque": (train.variable(self.motor, "torque"), printed(train.torque_unit(self.motor_shaft))),
+            "speed": (train.variable(self.motor_shaft, "speed"), train.speed_unit(self.motor_shaft)),
+            "position": (train.variable(self.shaft, "angle"), train.angle_unit(self.shaft)),
         }
 
     @cached_property
@@ -179,11 +179,14 @@ class Regime:
 
         n = len(model.states)
         block = np.zeros((n + 1, n + 1))
-        block[:n, :n], block[:n, n] = model.A, model.B[:, model.inputs.index(axis.train.command_of(axis.motor))]
+        block[:n, :n], block[:n, n] = (
+            model.A,
+            model.B[:, model.inputs.index(axis.train.variable(axis.motor, "command"))],
+        )
         over_tick = expm(block * axis.controller.sample_time)[:n]
         winding, law = None, axis.law[0]
         if law.is_oriented:
-            winding = OrientedWinding.of(axis.train.motors[axis.motor], axis.motor, axis.controller, law, model)
+            winding = OrientedWinding.of(axis.train, axis.motor, axis.controller, law, model)
         return cls(name, meaning, model, over_tick, winding)
 
 
@@ -217,7 +220,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
         return
     curve = train.gears[main].stiffness.core()  # type: ignore[union-attr]
     breaks, slopes = curve.side(forward=True)
-    bends = train.twist_of(main).removeprefix(f"{main}_")
+    bends = train.variable(main, "twist").removeprefix(f"{main}_")
     twists = {name: _last(gear) for name, gear in train.gears.items() if not isinstance(gear.stiffness, Rigid)}
     first = 1 if slopes[0] == 0.0 and len(slopes) > 1 else 0
     edges = [0.0, *breaks, BEYOND * _last(train.gears[main])]
@@ -245,7 +248,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
             "twist stuck",
             f"hysteresis holds the {bends} of {main}, {moving}",
             state,
-            {train.twist_contact_of(main): 0},
+            {train.variable(main, "twist_contact"): 0},
         )
     output = train.gears[main].output
     if train.shafts[output].friction_torque > 0.0:
@@ -254,7 +257,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
             0.5 * (edges[first + 1] - edges[first]), 0.5 * train.shafts[output].friction_torque / slopes[first]
         )
         state = TrainInitial(speeds=held, twists=twists | {main: near})
-        yield "load stuck", f"{output} sticks, the motor turns", state, {train.contact_of(output): 0}
+        yield "load stuck", f"{output} sticks, the motor turns", state, {train.variable(output, "contact"): 0}
 
 
 def _text(value: float, si: str) -> str:

@@ -106,10 +106,10 @@ class LinearLoop:
         plant, slots, own, inputs = np.split(np.eye(sum(counts)), np.cumsum(counts)[:-1])
         train = self.axis.train
         sampled = (
-            train.angle_of(position_shaft),
-            train.angle_of(speed_shaft),
-            train.speed_of(speed_shaft),
-            train.motor_torque_of(motor),
+            train.variable(position_shaft, "angle"),
+            train.variable(speed_shaft, "angle"),
+            train.variable(speed_shaft, "speed"),
+            train.variable(motor, "torque"),
         )
         # What a controller does not read need not follow from the states.
         read = [
@@ -118,7 +118,7 @@ class LinearLoop:
         ]
         after = step @ np.vstack([slots, *read, 0.0 * inputs if oriented else inputs])
         rows = {name: after[j] for j, (name, _, _) in enumerate(_core.axis_signals())}
-        angles = [train.angle_of(s) for s in (self.axis.motor_shaft, self.axis.shaft)]
+        angles = [train.variable(s, "angle") for s in (self.axis.motor_shaft, self.axis.shaft)]
         rows |= {angle: self._output(angle, plant) for angle in angles}
         rows |= {f"{name}_measured": rows[f"measured_{name}"] for name in ("speed", "position")}
         if winding is None:
@@ -229,7 +229,7 @@ class LinearLoop:
         """Angle of a shaft [rad], or position of a slide [m], at the samples. The load torque is a sine of 1 N·m, of
         a slide the force a sine of 1 N, of continuous time [Hz]."""
         m, n, winding = self.model, len(self.model.states), self.regime.winding
-        w, b = _angular(frequency), m.B[:, m.inputs.index(self.axis.train.load_torque_of(load))]
+        w, b = _angular(frequency), m.B[:, m.inputs.index(self.axis.train.variable(load, "load_torque"))]
         force = np.zeros((len(w), len(self.transition)), complex)
         nothing = np.zeros((len(w), len(INPUTS)))
 
@@ -243,7 +243,7 @@ class LinearLoop:
             for k, (onward, turn) in enumerate(zip(self._onward, self._turned(w).T, strict=True)):
                 force[:, : n + 2] = winding.forced(b, w, k % winding.every)
                 forced += turn[:, None] * (force @ onward.T)
-        return self._samples(self.axis.train.angle_of(shaft), w, forced, nothing)
+        return self._samples(self.axis.train.variable(shaft, "angle"), w, forced, nothing)
 
 
 def _angular(frequency: Any) -> np.ndarray:

@@ -179,11 +179,11 @@ def _varying(axis: Axis) -> str:
     """Name of an input beside the moves that varies over time; empty if there is none."""
     reference = axis.controller.reference
     if reference.sine_list():
-        return f"{axis.motor}_reference"
+        return axis.train.variable(axis.motor, "reference")
     for name, c in axis.scenario.axes().items():
         if c.reference != reference and (c.reference.duration > 0.0 or c.reference.sine_list()):
-            return f"{name}_reference"
-    driven = {f"{name}_command" for name in axis.scenario.axes()}
+            return axis.train.variable(name, "reference")
+    driven = {axis.train.variable(name, "command") for name in axis.scenario.axes()}
     for name, signal in axis.scenario.signals().items():
         points = signal.breakpoint_list()
         if name not in driven and (signal.sine_list() or len(points) > 1 or any(points[-1][2:])):

@@ -24,8 +24,8 @@ from .. import _core
 from ..control.controller import Controller
 from ..control.loops import FieldOriented
 from ..errors import InputError
-from ..model.motor import ShaftMotor
 from ..model.synchronous_motor import PhaseValues
+from ..model.train import DriveTrain
 from ..response.linear import LinearModel
 
 POINTS, WEIGHTS = (0.5 * (x + s) for x, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
@@ -68,22 +68,22 @@ class OrientedWinding:
     speed_row: np.ndarray  # the speed of the rotor over the plant's states
 
     @classmethod
-    def of(cls, motor: ShaftMotor, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:
+    def of(cls, train: DriveTrain, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:
         """In the regime of a linear model, at the speed of its point.
 
-        motor, name: with field-oriented control, and its name in the model.
+        name: of the motor with field-oriented control.
         c, law: its controller, and what the solver makes of that.
 
         Raises InputError: the inverter has not the voltage for it.
         """
-        loop = c.current
+        motor, loop = train.motors[name], c.current
         assert isinstance(loop, FieldOriented)
         assert motor.winding is not None
         assert motor.winding.max_current is not None
         phase = motor.winding.phase_values()
-        row, rated = model.outputs.index(f"{motor.shaft}_speed"), motor.rated_torque
+        row, rated = model.outputs.index(train.variable(motor.shaft, "speed")), motor.rated_torque
         state, inputs = (np.array([model.point[name] for name in names]) for names in (model.states, model.inputs))
-        drive = model.B[:, model.inputs.index(f"{name}_command")] / rated
+        drive = model.B[:, model.inputs.index(train.variable(name, "command"))] / rated
         speed = float(model.C[row] @ state + model.offset[row])
         free = float(model.C[row] @ (model.A @ state + model.B @ inputs + model.rate))
         encoder = c.encoder

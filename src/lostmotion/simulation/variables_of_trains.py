@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator, Mapping
+from collections.abc import Collection, Container, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -12,6 +12,7 @@ from ..control.controller import Controller
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.linear_train import LinearElements
+from ..model.torsion import Rigid
 from ..model.train import DriveTrain
 from ..recorded_numbers import may_be_left_out
 from .variables import Variable, variables_of_core
@@ -77,12 +78,28 @@ def only_input(train: DriveTrain, word: str, names: Collection[str], argument: s
 
     Raises InputError: there is none, or there are several.
     """
-    loads = {train.load_torque_of(shaft) for shaft in train.shafts}
+    loads = {train.variable(shaft, "load_torque") for shaft in train.shafts}
     found = [name for name in names if (name in loads) == (word == "load_torque")]
     if len(found) == 1:
         return found[0]
     why = f"there are several; give them by name: {', '.join(found)}" if found else "there is none; leave it out"
     raise InputError(f"{argument or word}: {why}")
+
+
+def angle_terms(train: DriveTrain, shaft: str, recorded: Container[object]) -> dict[str, float]:
+    """The angle of a shaft, such as a motor's, as a sum of recorded variables: factors by name, empty where gears do not give it.
+
+    A gear without housing and transmission error has ``input angle = ratio * (output angle + twist)``.
+    """
+    if (own := train.variable(shaft, "angle")) in recorded:
+        return {own: 1.0}
+    for name, gear in train.gears.items():
+        if gear.input != shaft or gear.housing is not None or gear.transmission_error is not None:
+            continue
+        if behind := angle_terms(train, gear.output, recorded):
+            terms = {variable: gear.ratio * factor for variable, factor in behind.items()}
+            return terms if isinstance(gear.stiffness, Rigid) else terms | {train.variable(name, "twist"): gear.ratio}
+    return {}
 
 
 def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:

@@ -109,7 +109,7 @@ def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
         remark = f"one amplifier feeds one motor, and this train has {len(train.motors)}; check each axis on its own"
         return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
     ((name, motor),) = train.motors.items()
-    torque, speed = result[train.motor_torque_of(name)], result[train.speed_of(motor.shaft)]
+    torque, speed = result[train.variable(name, "torque")], result[train.variable(motor.shaft, "speed")]
     where = scenario.key_in_file(scenario.motor_key(name))
     return amplifier_of_a_run(result, motor, torque, speed, scenario.task, where)
 
@@ -117,12 +117,12 @@ def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
 def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     train = scenario.train()
     gear, where = train.gears[name], scenario.key_in_file(scenario.gear_key(name))
-    torque = train.output_torque_of(name)
+    torque = train.variable(name, "output_torque")
     cycle = duty_cycle(
         result,
         scenario.task.cycle,
-        speed=train.speed_of(gear.input),
-        motor_torque=train.input_torque_of(name),
+        speed=train.variable(gear.input, "speed"),
+        motor_torque=train.variable(name, "input_torque"),
         output_torque=torque,
     )
     peak = float(abs(result[torque]).max())
@@ -146,7 +146,10 @@ def _of_slide(scenario: Scenario, name: str, peak: float) -> list[Finding]:
 def _screw(scenario: Scenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
     """Life, static load, buckling, bending speed and ball speed of a screw, over the run, repeated without a pause."""
     train, time = scenario.train(), result.time
-    force, speed = result[train.output_torque_of(name)], result[f"{train.gears[name].output}_speed"]
+    force, speed = (
+        result[train.variable(name, "output_torque")],
+        result[train.variable(train.gears[name].output, "speed")],
+    )
     load = AxialLoad(time, speed, force, scenario.task.cycle or float(time[-1] - time[0]))
     life = screw_life(load, screw)
     where = scenario.key_in_file(f"screws.{name}")
@@ -166,7 +169,7 @@ def _load_torques(scenario: Scenario, name: str, result: RunArrays) -> list[floa
     shaft, found = gear.output, list[float]()
     while not found:
         if shaft in scenario.loads():
-            torque = result[train.load_torque_of(shaft)]
+            torque = result[train.variable(shaft, "load_torque")]
             found = [share * t for t in sorted({float(torque.max()), float(torque.min())} - {0.0})]
         behind = next((g for g in train.gears.values() if g.input == shaft), None)
         if behind is None:
@@ -182,7 +185,7 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
     train = scenario.train()
     motor, key = train.motors[name], scenario.motor_key(name)
     where = scenario.key_in_file(key)
-    torque, speed = train.motor_torque_of(name), train.speed_of(motor.shaft)
+    torque, speed = train.variable(name, "torque"), train.variable(motor.shaft, "speed")
     if motor.kind == "stepper":  # its current does not follow its torque
         judged = [
             *speed_of_stepper(motor, float(abs(result[speed]).max()), where),
@@ -190,9 +193,9 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
         ]
         return judged, np.zeros_like(result.time)
     cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
-    command, T, w = (result[key] for key in (train.command_of(name), torque, speed))
+    command, T, w = (result[key] for key in (train.variable(name, "command"), torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
-    oriented = oriented_amplitudes(result, key)
+    oriented = oriented_amplitudes(scenario, result, name)
     slides = train.is_slide(motor.shaft)
     findings = [
         largest_speed(motor, float(abs(w).max()), where, slides=slides),
@@ -204,7 +207,7 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
     findings = [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
     if slides:
         findings = [replace(f, remark=OF_LINEAR_MOTORS) if f.verdict == "unknown" else f for f in findings]
-    return findings, power_in_run(motor, result, command, torque, speed, key)
+    return findings, power_in_run(scenario, name, result, command, torque, speed)
 
 
 def _over_estimates(scenario: Scenario, findings: list[Finding]) -> list[Finding]:
@@ -258,16 +261,18 @@ def _with_sinking(scenario: Scenario, finding: Finding, result: RunArrays, cycle
 def _sinking(scenario: Scenario, result: RunArrays) -> tuple[float, float]:
     """Time [s] in which loads drive the turning motors with commands of 0: of the whole run, and after the last command."""
     train, time = scenario.train(), result.time
-    command = np.sum([abs(result[train.command_of(name)]) for name in train.motors], axis=0)
-    speed = np.sum([abs(result[train.speed_of(motor.shaft)]) for motor in train.motors.values()], axis=0)
+    command = np.sum([abs(result[train.variable(name, "command")]) for name in train.motors], axis=0)
+    speed = np.sum([abs(result[train.variable(motor.shaft, "speed")]) for motor in train.motors.values()], axis=0)
     if not train.motors or not scenario.loads():
         return 0.0, 0.0
     first = next(iter(train.motors.values())).shaft
     power = np.zeros_like(time)
     for shaft in scenario.loads():
         ratio = turns(train, shaft, first) if len(train.motors) == 1 else None
-        turned = result[train.speed_of(shaft)] if ratio is None else ratio * result[train.speed_of(first)]
-        power += result[train.load_torque_of(shaft)] * turned
+        turned = (
+            result[train.variable(shaft, "speed")] if ratio is None else ratio * result[train.variable(first, "speed")]
+        )
+        power += result[train.variable(shaft, "load_torque")] * turned
     sinks = (command == 0.0) & (speed > STANDSTILL * speed.max()) & (power < 0.0)
     lasting = np.diff(time) * (sinks[1:] & sinks[:-1])
     commanded = np.flatnonzero(command)

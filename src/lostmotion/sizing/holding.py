@@ -98,10 +98,10 @@ def _lasting_speed(
     while True:
         table = SimulationTable(duration=duration, sample_interval=duration / SAMPLES)
         found = run(one.unchecked(simulation=table), energy=False)
-        angle = found[train.angle_of(shaft)]
+        angle = found[train.variable(shaft, "angle")]
         half, quarter = SAMPLES // 2, SAMPLES // 4
         last, before = angle[-1] - angle[-1 - quarter], angle[-1 - quarter] - angle[-1 - half]
-        if not found[train.speed_of(motor_shaft)][-quarter:].any():
+        if not found[train.variable(motor_shaft, "speed")][-quarter:].any():
             return 0.0
         if abs(last - before) < STEADY * abs(last) or duration > MAX_DURATION:
             return float(last / (0.25 * duration))

@@ -7,14 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.continuous import ContinuousController
-from ..control.controller import Controller
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Temperature
 from ..inputs.validation import did_you_mean
-from ..model.motor import Motor
+from ..model.motor import ShaftMotor
 from ..simulation.runs.results import RunArrays, scenario_of
+from ..simulation.scenario.scenario import Scenario
 from .motor_check import command_of_run, current_voltage_power
 from .thermal import COPPER, mean_square, need_two_bodies, rms
 from .torque_squares import squares_of
@@ -55,14 +54,17 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     >>> sorted(lm.sizing.motor_current(result).data_vars)
     ['current', 'current_rms', 'voltage']
     """
-    m, where, (command, torque, speed) = _motor_of(result, motor)
-    oriented = oriented_amplitudes(result, where)
-    command = command_of_run(m, _controller_of(result, where), command, torque, speed)
+    scenario = scenario_of(result)
+    name, m, (command, torque, speed) = _motor_of(scenario, result, motor)
+    oriented = oriented_amplitudes(scenario, result, name)
+    command = command_of_run(m, scenario.controllers.get(name), command, torque, speed)
     current, voltage = oriented or current_voltage_power(m, command, torque, speed)[:2]
     attributes: dict[str, Any] = {}
     if m.winding is None:
         if m.limits is None or m.limits.torque_constant is None:
-            raise InputError(f"motor_current: the motor lacks {where}.limits.torque_constant; give it, or a winding")
+            raise InputError(
+                f"motor_current: the motor lacks {scenario.motor_key(name)}.limits.torque_constant; give it, or a winding"
+            )
         found = {"current": (current, "A", "current of the armature")}
     else:
         found = {
@@ -75,26 +77,23 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
     return _dataset(result, found, attributes)
 
 
-def phase_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> list[np.ndarray] | None:
+def phase_amplitudes(scenario: Scenario, result: xarray.Dataset | RunArrays, motor: str) -> list[np.ndarray] | None:
     """Currents i_d, i_q [A] and voltages u_d, u_q [V] under field-oriented control; None without."""
-    names = [f"{_prefix(where)}{axis}_{what}" for what in ("current", "voltage") for axis in ("direct", "quadrature")]
+    of = ("direct_current", "quadrature_current", "direct_voltage", "quadrature_voltage")
+    names = [scenario.train().variable(motor, quantity) for quantity in of]
     if any(name not in result for name in names):
         return None
     return [np.asarray(result[name]) for name in names]
 
 
-def oriented_amplitudes(result: xarray.Dataset | RunArrays, where: str) -> tuple[np.ndarray, np.ndarray] | None:
+def oriented_amplitudes(
+    scenario: Scenario, result: xarray.Dataset | RunArrays, motor: str
+) -> tuple[np.ndarray, np.ndarray] | None:
     """Current [A], with the sign of the torque, and voltage [V] under field-oriented control; None without."""
-    if (amplitudes := phase_amplitudes(result, where)) is None:
+    if (amplitudes := phase_amplitudes(scenario, result, motor)) is None:
         return None
     i_d, i_q, u_d, u_q = amplitudes
     return np.copysign(np.hypot(i_d, i_q), i_q), np.hypot(u_d, u_q)
-
-
-def _controller_of(result: xarray.Dataset, where: str) -> Controller | ContinuousController | None:
-    scenario = scenario_of(result)
-    controllers: dict[str, Controller | ContinuousController] = {**scenario.axes(), **scenario.continuous()}
-    return controllers.get(where.removeprefix("motors."))
 
 
 @checked
@@ -148,14 +147,15 @@ def temperatures(
     >>> bool(heat["winding_temperature"][-1] > 25.0)
     True
     """
-    m, where, (_, torque, _) = _motor_of(result, motor)
+    scenario = scenario_of(result)
+    name, m, (_, torque, _) = _motor_of(scenario, result, motor)
     if ambient is None:
         ambient = scenario_of(result).task.ambient_temperature
-    bodies = need_two_bodies(m, ambient, 0.0 if constant_resistance else COPPER, where)
+    bodies = need_two_bodies(m, ambient, 0.0 if constant_resistance else COPPER, scenario.motor_key(name))
     time = result["time"].values
     if len(time) < 2:
         raise InputError("temperatures: the result has a single sample; shorten simulation.sample_interval")
-    heating, squares, lead, of_torque = _heating(result, m, where, torque)
+    heating, squares, lead, of_torque = _heating(scenario, result, name, torque)
     if repeated:
         if (winding, case) != (None, None):
             raise InputError(
@@ -188,27 +188,21 @@ def temperatures(
 
 
 def _heating(
-    result: xarray.Dataset, m: Motor, where: str, torque: np.ndarray
+    scenario: Scenario, result: xarray.Dataset, name: str, torque: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, float, float]:
     """Torque that heats as the motor does [N·m], mean of its square over each interval, what the heat leads by at most
     (`Squares.lead`), and the rms torque."""
-    scenario, time = scenario_of(result), result["time"].values
+    time, train = result["time"].values, scenario.train()
     if any(controller.law for controller in scenario.axes().values()):
         return torque, mean_square(torque), math.inf, rms(time, torque)
-    name = next(name for name in scenario.train().motors if scenario.motor_key(name) == where)
-    found = squares_of(scenario, name, time)
-    if m.winding is None or (oriented := oriented_amplitudes(result, where)) is None:
+    found, winding = squares_of(scenario, name, time), train.motors[name].winding
+    if winding is None or (oriented := oriented_amplitudes(scenario, result, name)) is None:
         return torque, found.square, found.lead, found.rms
-    phase = m.winding.phase_values()
-    heat = result[f"{_prefix(where)}copper_heat"].values
+    phase = winding.phase_values()
+    heat = result[train.variable(name, "copper_heat")].values
     square = phase.torque_constant**2 * np.diff(heat) / (1.5 * phase.resistance * np.diff(time))
     lead = float((square * np.diff(time)).max(initial=0.0))  # no heat is negative
     return phase.torque_constant * oriented[0], square, lead, found.rms
-
-
-def _prefix(where: str) -> str:
-    """Prefix of the variables of a motor, by its table."""
-    return "" if where == "motor" else f"{where.removeprefix('motors.')}_"
 
 
 def _dataset(
@@ -223,9 +217,8 @@ def _dataset(
     return xr.Dataset(variables, coords={"time": result["time"]}, attrs=attributes)
 
 
-def _motor_of(result: xarray.Dataset, name: str | None) -> tuple[Motor, str, list[np.ndarray]]:
-    """The motor, its table, and its command, torque [N·m] and speed [rad/s] over the run."""
-    scenario = scenario_of(result)
+def _motor_of(scenario: Scenario, result: xarray.Dataset, name: str | None) -> tuple[str, ShaftMotor, list[np.ndarray]]:
+    """Name of the motor, the motor, and its command, torque [N·m] and speed [rad/s] over the run."""
     train = scenario.train()
     motors = {motor: m for motor, m in train.motors.items() if not train.is_slide(m.shaft)}
     if name is None and len(motors) == 1:
@@ -236,8 +229,8 @@ def _motor_of(result: xarray.Dataset, name: str | None) -> tuple[Motor, str, lis
         hint = listed if name is None else did_you_mean(name, motors, listed)
         raise InputError(f"motor {name!r}: {hint}" if name is not None else f"motor is missing; {hint}")
     m = motors[name]
-    names = (train.command_of(name), train.motor_torque_of(name), train.speed_of(m.shaft))
-    return m, scenario.motor_key(name), _read(result, *names)
+    names = (train.variable(name, "command"), train.variable(name, "torque"), train.variable(m.shaft, "speed"))
+    return name, m, _read(result, *names)
 
 
 def _read(result: xarray.Dataset, *names: str) -> list[np.ndarray]:

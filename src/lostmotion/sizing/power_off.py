@@ -22,7 +22,7 @@ HOLDING = "holding with command 0"
 def holdings(scenario: Scenario, result: RunArrays) -> list[Finding]:
     """Whether the drive bears the loads of the run with command 0, and the brake of its task against them."""
     train, brake = scenario.train(), scenario.task.brake
-    loads = {shaft: result[train.load_torque_of(shaft)] for shaft in scenario.loads()}
+    loads = {shaft: result[train.variable(shaft, "load_torque")] for shaft in scenario.loads()}
     if (why := _many_ways(scenario)) is not None:
         return [not_judged(rule, why) for rule in ("holding", *(() if brake is None else ("holding_brake",)))]
     (motor,) = train.motors.values()
@@ -83,7 +83,7 @@ def _by_runs(
             return [Finding("holding", HOLDING, "by the brake", held[0].verdict)]
         return [not_judged("holding", f"{why}; give task.brake")]
     ((shaft, torque),) = acting.items()
-    fastest = float(abs(result[train.speed_of(shaft)]).max())
+    fastest = float(abs(result[train.variable(shaft, "speed")]).max())
     extremes = sorted({float(torque.max()), float(torque.min())} - {0.0})
     return [_held(scenario, shaft, load, fastest, held) for load in extremes]
 

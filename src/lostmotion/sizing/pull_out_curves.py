@@ -273,5 +273,5 @@ class _Axis:
         (lost,) = (found for found in found_in(made, result) if found.motor == self.name)
         late = np.asarray(result["time"]) >= first
         field = np.asarray(result["time"]) * speed
-        lag = (np.asarray(result[train.angle_of(shaft)]) - field)[late] / self.motor.full_step
+        lag = (np.asarray(result[train.variable(shaft, "angle")]) - field)[late] / self.motor.full_step
         return lost, lag

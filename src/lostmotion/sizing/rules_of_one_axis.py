@@ -69,11 +69,11 @@ def dead_zone(scenario: Scenario, result: RunArrays) -> Finding:
     if motor.kind == "stepper":
         return not_judged("dead_zone", "the command of a stepper is an angle, which moves the load in steps")
     inputs = scenario.core(sampled=False).input_names()
-    others = {n: float(result[n][0]) for n in inputs if n != train.command_of(name)}
+    others = {n: float(result[n][0]) for n in inputs if n != train.variable(name, "command")}
     forward, backward = smallest_commands(scenario, others)
-    peak = float(abs(result[train.command_of(name)]).max())
+    peak = float(abs(result[train.variable(name, "command")]).max())
     value = f"the load moves above a command of {forward + 0.0:.4g} and below {backward + 0.0:.4g}"  # where it is -0.0
-    moves = bool((result[train.speed_of(motor.shaft)] != 0.0).any())
+    moves = bool((result[train.variable(motor.shaft, "speed")] != 0.0).any())
     if peak == 0.0:
         return Finding("dead_zone", "dead zone", value, "ok", "the command is 0 throughout")
     if peak <= min(forward, -backward) and not moves:

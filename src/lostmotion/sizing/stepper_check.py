@@ -29,7 +29,9 @@ def stepper_rules(scenario: Scenario, name: str, result: RunArrays) -> list[Find
     """Findings of one stepper of a run."""
     train = scenario.train()
     motor, where = train.motors[name], scenario.key_in_file(scenario.motor_key(name))
-    torque, speed = (np.abs(result[key]) for key in (train.motor_torque_of(name), train.speed_of(motor.shaft)))
+    torque, speed = (
+        np.abs(result[key]) for key in (train.variable(name, "torque"), train.variable(motor.shaft, "speed"))
+    )
     lost = next(found for found in found_in(scenario, result) if found.motor == name)
     verdict: Judgement = "warning" if lost.times else "ok"
     value = f"{lost.lost} full steps" if lost.times else "none"

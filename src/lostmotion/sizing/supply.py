@@ -13,6 +13,7 @@ from ..model.duty import Amplifier, Bus
 from ..model.motor import Motor
 from ..model.task import Task
 from ..simulation.runs.results import RunArrays
+from ..simulation.scenario.scenario import Scenario
 from .axis_rules import missing
 from .catalogue_formulas import bus_voltage, capacitor_energy
 from .duty_cycle import integral
@@ -55,13 +56,13 @@ def returned(time: np.ndarray, power: np.ndarray, cycle: float) -> Returned:
 
 
 def power_in_run(
-    motor: Motor, result: RunArrays, command: np.ndarray, torque: str, speed: str, where: str
+    scenario: Scenario, name: str, result: RunArrays, command: np.ndarray, torque: str, speed: str
 ) -> np.ndarray:
     """Power that a motor takes at the samples of a run [W]; NaN where its data do not tell."""
-    if (amplitudes := phase_amplitudes(result, where)) is not None:
+    if (amplitudes := phase_amplitudes(scenario, result, name)) is not None:
         i_d, i_q, u_d, u_q = amplitudes
         return np.asarray(1.5 * (u_d * i_d + u_q * i_q))
-    return current_voltage_power(motor, command, result[torque], result[speed])[2]
+    return current_voltage_power(scenario.motors[name], command, result[torque], result[speed])[2]
 
 
 def bus_findings(

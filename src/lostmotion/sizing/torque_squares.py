@@ -70,7 +70,7 @@ def squares_of(scenario: Scenario, motor: str, time: np.ndarray) -> Squares:
     signals = part.signals().values()
     breaks = [t for signal in signals for t, *_ in signal.breakpoint_list()]
     fastest = max((f for signal in signals for _, f, _ in signal.sine_list()), default=0.0)
-    channel = part.train().motor_torque_of(motor)
+    channel = part.train().variable(motor, "torque")
     return squares(core_case(part), channel, time, control=control, breaks=breaks, fastest=fastest)
 
 

@@ -282,7 +282,7 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
     state, capacities = scenario.start(), scenario.capacities()
     last = table.samples - 1
     fastest = max((f for name in names for _, f, _ in signals[name].sine_list()), default=0.0)
-    torque = scenario.train().motor_torque_of(law.name)
+    torque = scenario.train().variable(law.name, "torque")
     now, results, temperatures = start, [], [np.array([start])]
     heat = dict.fromkeys(("winding", "housing", "stored", "ambient"), 0.0)
     for first in range(0, last, each):
@@ -296,7 +296,9 @@ def _course(law: _Law, each: int, start: tuple[float, float]) -> _Course:
         grid: dict[str, Any] = {"duration": length, "sample_interval": table.sample_interval, "samples": samples + 1}
         case = _core.Case(core, inputs=inputs, start=state, hysteresis_capacities=capacities)
         result = _core.run(case, **grid, energy=True, max_switchings=MAX_SWITCHINGS)
-        state, capacities = _end(result["end_state"], {gear: scenario.train().capacity_of(gear) for gear in capacities})
+        state, capacities = _end(
+            result["end_state"], {gear: scenario.train().variable(gear, "hysteresis_capacity") for gear in capacities}
+        )
         breaks = [p[0] - begin for name in names for p in signals[name].breakpoint_list()]
         torques = squares(case, torque, np.array([0.0, length]), breaks=breaks, fastest=fastest)
         square = float(torques.square[0]) / law.magnet_factor(now[1]) ** 2

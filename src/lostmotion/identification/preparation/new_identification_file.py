@@ -397,7 +397,7 @@ def _scale_lines(name: str, quantity: str, scenario: Scenario | None) -> list[st
 def _signals(scenario: Scenario | None) -> list[str]:
     if scenario is None:
         return []
-    return [*scenario.signals(), *(f"{name}_reference" for name in scenario.axes())]
+    return [*scenario.signals(), *(scenario.train().variable(name, "reference") for name in scenario.axes())]
 
 
 def _about_kind(c: _Seen, variable: str, units: Mapping[str, str]) -> list[str]:

@@ -122,7 +122,9 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
             raise InputError(f"no channel shows the twist of gears.{name}")
     for kind in ("angle", "speed")[: 1 if depends_on_angle(train) else 2]:
         for name, m in rig.task.measured.items():
-            by_variable = {train.angle_of(s) if kind == "angle" else train.speed_of(s): s for s in train.shafts}
+            by_variable = {
+                train.variable(s, "angle") if kind == "angle" else train.variable(s, "speed"): s for s in train.shafts
+            }
             shaft = by_variable.get(m.variable)
             if shaft is None or numbers_of(m, known)["filter_time"] > 0.0:
                 continue

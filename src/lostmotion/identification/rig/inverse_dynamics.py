@@ -93,7 +93,7 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
         law = shaft.friction()
         dry += abs(n) * np.interp(np.abs(n * s.speed), law["speeds"] or [0.0], law["torques"] or [law["torque"]])
         if name in scenario.loads():
-            other += n * _acting(rig, s, known, scenario, train.load_torque_of(name))
+            other += n * _acting(rig, s, known, scenario, train.variable(name, "load_torque"))
         if (stops := shaft.end_stops) is not None:
             motion = zip((n * s.angle).tolist(), (n * s.speed).tolist(), strict=True)
             other -= n * np.array([stops.torque(phi, w) for phi, w in motion])
@@ -152,7 +152,7 @@ def _motor_torque(
 ) -> np.ndarray:
     """Measured, or of the command of a torque source."""
     for channel, m in rig.task.measured.items():
-        if m.variable == scenario.train().motor_torque_of(name) and m.filter_time == 0.0:
+        if m.variable == scenario.train().variable(name, "torque") and m.filter_time == 0.0:
             at, torque = measured_course(rig, s.log, channel, known)
             there = np.isfinite(torque)
             return np.asarray(np.interp(s.time, at[there], torque[there]))
@@ -161,7 +161,7 @@ def _motor_torque(
     if motor.kind != "torque_source":
         what = "the angle of its field" if motor.kind == "stepper" else "a voltage"
         raise InputError(f"motors.{name} has {what} as its command, and no channel shows its torque")
-    torque = motor.rated_torque * _acting(rig, s, known, scenario, f"{name}_command")
+    torque = motor.rated_torque * _acting(rig, s, known, scenario, scenario.train().variable(name, "command"))
     limit = np.inf if motor.torque_limit is None else motor.torque_limit
     return np.asarray(np.clip(torque, -limit, limit))
 

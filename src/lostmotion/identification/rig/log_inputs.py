@@ -84,7 +84,7 @@ class LogInputs:
             return OPEN_LOOP
         control = own(built.scenario.control())
         for axis, name in zip(control[1], axes, strict=True):
-            signal = f"{name}_reference"
+            signal = built.scenario.train().variable(name, "reference")
             if signal in self._task.inputs:
                 points = columns(("time", "value", "rate"), self._points(signal, known).tolist())
                 axis.set({"reference": {"pieces": points}})

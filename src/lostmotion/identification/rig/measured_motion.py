@@ -40,11 +40,11 @@ def shown_motion(rig: Rig) -> ShownMotion:
     refuse_given_motion(rig.scenario)
     train = rig.scenario.train()
     plain = {name: m.variable for name, m in rig.task.measured.items() if m.filter_time == 0.0}
-    by_variable = {train.angle_of(s): s for s in train.shafts}
+    by_variable = {train.variable(s, "angle"): s for s in train.shafts}
     for name, variable in plain.items():
         if variable in by_variable:
             return ShownMotion(name, by_variable[variable], is_speed=False)
-    by_speed = {train.speed_of(s): s for s in train.shafts}
+    by_speed = {train.variable(s, "speed"): s for s in train.shafts}
     for name, variable in plain.items():
         if variable in by_speed and not depends_on_angle(train):
             return ShownMotion(name, by_speed[variable], is_speed=True)

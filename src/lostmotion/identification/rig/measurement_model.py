@@ -19,14 +19,6 @@ FINE = 2e-3  # [s] between samples of a run behind a filter, so that a jump of t
 NUMBERS = ("scale", "offset", "delay", "filter_time")
 
 
-def rate_of(variable: str) -> str:
-    """The variable that is the rate of an angle or a position."""
-    for suffix in ("_angle", "_position"):
-        if variable.endswith(suffix) and not variable.endswith("_measured_position"):
-            return f"{variable.removesuffix(suffix)}_speed"
-    return ""
-
-
 @dataclass(frozen=True)
 class Probe:
     """A variable of the rig, and the instants at which it is wanted."""
@@ -39,9 +31,10 @@ class Measuring:
     """The measured channels of a log at some values of the parameters.
 
     known: what formulas may name.
+    rates: of angles and positions, the variables that are their rates.
     """
 
-    def __init__(self, task: Identification, log: Prepared, known: Mapping[str, Any], rates: Sequence[str]) -> None:
+    def __init__(self, task: Identification, log: Prepared, known: Mapping[str, Any], rates: Mapping[str, str]) -> None:
         self._log, self._channels = log, task.measured
         self._numbers = {name: numbers_of(m, known) for name, m in task.measured.items()}
         self._interval = task.fit.sample_interval
@@ -58,8 +51,8 @@ class Measuring:
         for name, m in self._channels.items():
             at = self._at(name)
             found.append(Probe(m.variable, at))
-            if rate_of(m.variable) in self._rates:
-                found.append(Probe(rate_of(m.variable), at))
+            if m.variable in self._rates:
+                found.append(Probe(self._rates[m.variable], at))
         return found
 
     def values(self, seen: Sequence[np.ndarray]) -> np.ndarray:
@@ -105,8 +98,7 @@ class Measuring:
         """(name, variable, its rate) of each channel."""
         left = iter(seen)
         return [
-            (name, next(left), next(left) if rate_of(m.variable) in self._rates else None)
-            for name, m in self._channels.items()
+            (name, next(left), next(left) if m.variable in self._rates else None) for name, m in self._channels.items()
         ]
 
     def _of(self, name: str, x: np.ndarray, numbers: Mapping[str, float]) -> np.ndarray:

@@ -21,7 +21,7 @@ from ..task.free_parameters import FreeParameter
 from ..task.identification_file import Identification
 from .log_inputs import NUMBERS, LogInputs
 from .measured_motion_input import GIVEN_SPEED
-from .measurement_model import Measuring, Probe, delays_that_name, numbers_of, rate_of
+from .measurement_model import Measuring, Probe, delays_that_name, numbers_of
 from .rig_scenario import Built, Rig
 
 STEP = 2.0**-24  # of a value or its scale: the step and the rounding of a difference over it are some 1e-8 of it
@@ -125,12 +125,8 @@ class _Course:
         self.case: Any = None
         self.train: Any = None
         try:
-            rates = (
-                [rate_of(m.variable) for m in rig.task.measured.values()]
-                if delays_that_name(rig.task, list(by))
-                else []
-            )
-            self._measuring = Measuring(rig.task, log, self._known, [r for r in rates if r in rig.units])
+            rates = rig.rates if delays_that_name(rig.task, list(by)) else {}
+            self._measuring = Measuring(rig.task, log, self._known, rates)
             probes = self._measuring.probes()
         except InputError as error:
             self._error, probes = error, []
@@ -200,7 +196,7 @@ class _Course:
         keys = rig.keys_of(name, self._rung, phase)
         of_rig = [key for key in keys if not key.startswith("initial.")]
         acts = {i for i, c in task.inputs.items() if any(name in names_in(getattr(c, k)) for k in NUMBERS)}
-        axes = {f"{a}_reference" for a in built.scenario.axes()}
+        axes = {built.scenario.train().variable(a, "reference") for a in built.scenario.axes()}
         _refuse_held_delay(task, name, acts & axes)
         of_control = bool(axes) and (bool(acts & axes) or any(key.startswith("controllers") for key in of_rig))
         moved = self._state_by.get(name)

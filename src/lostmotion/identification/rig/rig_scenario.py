@@ -19,12 +19,12 @@ from ...simulation.runs.sensitivities import channels_of
 from ...simulation.scenario.requirements import need_no_impacts
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
+from ...simulation.variables_of_trains import angle_terms
 from ..prepared_log import Prepared
 from ..task.file_formulas import Formula, names_in
 from ..task.free_parameters import in_unit
 from ..task.identification_file import CHANNEL_FORMULAS, Identification, MeasuredChannel, Rung
 from .scenario_variants import Variants
-from .shaft_angles import angle_terms
 
 KEPT = 800  # scenarios that are kept ready, a tenth of a megabyte each; few serve again once the search has moved on
 
@@ -50,7 +50,8 @@ class Built:
         """A variable of a run, or the angle of a shaft through the gears behind it, as a sum of channels; empty: it is not there."""
         if variable in self.names:
             return {variable: 1.0}
-        return angle_terms(self.scenario, variable.removesuffix("_angle").removesuffix("_position"), self.names)
+        train = self.scenario.train()
+        return angle_terms(train, train.shaft_of(variable, "angle"), self.names)
 
     @cached_property
     def inputs(self) -> list[str]:
@@ -91,6 +92,9 @@ class Rig:
         self._built: dict[Any, Built] = {}
         self._with_given: dict[Any, dict[str, float]] = {}
         self.units = units_of(self.scenario)
+        train = self.scenario.train()
+        rates = {train.variable(shaft, "angle"): train.variable(shaft, "speed") for shaft in train.shafts}
+        self.rates = {angle: speed for angle, speed in rates.items() if speed in self.units}
         for name, channel in task.inputs.items():
             if name.endswith("_given_acceleration") and name in self._signals():
                 raise InputError("follows from the given speed; give that alone", f"inputs.{name}")
@@ -158,7 +162,8 @@ class Rig:
         return self.task.rungs()
 
     def _signals(self) -> list[str]:
-        return [*self.scenario.signals(), *(f"{name}_reference" for name in self.scenario.axes())]
+        train = self.scenario.train()
+        return [*self.scenario.signals(), *(train.variable(name, "reference") for name in self.scenario.axes())]
 
     def formulas(self, rung: int, phase: int) -> dict[str, Any]:
         """Formulas of the values of the scenario, by dotted key."""
@@ -226,7 +231,7 @@ class Rig:
             return start
         found = dict(start)
         for shaft, speed in speeds.items():
-            change = speed - built.scenario.signals()[f"{shaft}_given_speed"].at_start()
+            change = speed - built.scenario.signals()[built.scenario.train().variable(shaft, "given_speed")].at_start()
             key = (shaft, built.ratios)
             if key not in self._with_given:
                 table = built.scenario.given_key(shaft).rpartition(".")[0]
@@ -279,19 +284,20 @@ def units_of(scenario: Scenario) -> dict[str, str]:
     units = {str(name): str(unit) for name, _, unit, _ in scenario.core().channels()}
     train, kinds = scenario.train(), {"position": "rad", "speed": "rad/s", "torque": "N*m"}
     units |= {
-        train.angle_of(name): train.angle_unit(name) for name in train.shafts if angle_terms(scenario, name, units)
+        train.variable(name, "angle"): train.angle_unit(name)
+        for name in train.shafts
+        if angle_terms(train, name, units)
     }
-    for name in scenario.signals():
-        if name.endswith("_given_speed"):
-            units[name] = units[name.replace("_given_speed", "_speed")]
+    units |= {train.variable(name, "given_speed"): train.speed_unit(name) for name in scenario.given()}
     for name, m in train.motors.items():
-        units.setdefault(f"{name}_command", "1")
+        command = train.variable(name, "command")
+        units.setdefault(command, "1")
         if m.kind == "torque_source" and m.rated_torque == 1.0:  # a torque is its own multiple of 1 N m
-            units[f"{name}_command"] = units.get(train.motor_torque_of(name), "N*m")
+            units[command] = units.get(train.variable(name, "torque"), "N*m")
     for name, c in scenario.axes().items():
         motor, position = scenario.sliding()[scenario.prefix(name)]
         slides = position and c.reference.kind != "torque"
-        units[f"{name}_reference"] = of_slides(kinds[c.reference.kind], positions=slides, forces=motor)
+        units[train.variable(name, "reference")] = of_slides(kinds[c.reference.kind], positions=slides, forces=motor)
     return units
 
 

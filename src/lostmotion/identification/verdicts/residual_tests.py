@@ -147,15 +147,11 @@ def _derivative(x: np.ndarray, width: int, order: int) -> np.ndarray:
 
 def shape_variables(rig: Rig) -> dict[str, str]:
     """Variables of the rig over which residuals are looked at: speed and angle of the first measured shaft, and loads of gears."""
-    measured = next(iter(rig.task.measured.values())).variable
-    shaft = measured.removesuffix("_angle").removesuffix("_position").removesuffix("_speed")
-    found = {
-        "speed": f"{shaft}_speed",
-        "angle": rig.scenario.train().angle_of(shaft) if shaft in rig.scenario.train().shafts else f"{shaft}_angle",
-    }
-    loads = [name for name in rig.units if name.endswith(("_output_torque", "_output_force"))]
-    for name in loads:
-        found["load" if len(loads) == 1 else f"load of {name.rsplit('_', 2)[0]}"] = name
+    train, measured = rig.scenario.train(), next(iter(rig.task.measured.values())).variable
+    shaft = train.shaft_of(measured, "angle", "speed")
+    found = {quantity: train.variable(shaft, quantity) for quantity in ("speed", "angle")}
+    for gear in train.gears:
+        found["load" if len(train.gears) == 1 else f"load of {gear}"] = train.variable(gear, "output_torque")
     return {name: variable for name, variable in found.items() if variable in rig.units}
 
 

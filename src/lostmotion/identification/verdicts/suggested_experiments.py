@@ -47,8 +47,8 @@ def torque_known(rig: Rig) -> bool:
     """Whether the torque of each motor is an input or in a channel."""
     variables, train = {m.variable for m in rig.task.measured.values()}, rig.scenario.train()
     return all(
-        (motor.kind == "torque_source" and f"{name}_command" in rig.task.inputs)
-        or variables & {train.motor_torque_of(name), f"{name}_current"}
+        (motor.kind == "torque_source" and train.variable(name, "command") in rig.task.inputs)
+        or variables & {train.variable(name, "torque"), train.variable(name, "current")}
         for name, motor in train.motors.items()
     )
 

@@ -252,8 +252,8 @@ def _unit(train: Scenario) -> str:
 
 def _travel(train: Scenario) -> float:
     """Largest distance of the reference from where it begins; 1 where it never moves."""
-    ((motor, controller),) = train.continuous().items()
-    points = controller.signals(motor)[f"{motor}_reference"].breakpoint_list()
+    (controller,) = train.continuous().values()
+    points = controller.reference.breakpoint_list()
     values = [value for _, value, _ in points] + [0.0]
     return float(np.ptp(values)) or 1.0
 

@@ -190,7 +190,7 @@ def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
     rest = cycle.whole if cycle is not None else at_rest(axis)
     if not rest.cycles:
         return Hunting(rest.verdict, rest.described(), False, NAN, {}, None, np.array([]), ())
-    angles = (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft))
+    angles = (axis.train.variable(axis.motor_shaft, "angle"), axis.train.variable(axis.shaft, "angle"))
     amplitudes = dict(zip(angles, (rest.motor_amplitude, rest.amplitude), strict=True))
     found = tuple(cycle.causes) if cycle is not None else ()
     return Hunting("hunts", "", False, rest.frequency, amplitudes, None, np.array([]), found)
@@ -250,7 +250,7 @@ def hunting_map(
         raise InputError(f"grid: {math.prod(shape)} points are more than {MAX_POINTS}; give fewer values")
     plain = train.train()
     of = (
-        plain.angle_of(list(plain.shafts)[-1])
+        plain.variable(list(plain.shafts)[-1], "angle")
         if variable is None
         else known_output(variable, UndrivenLoop.of(train).channels)
     )
@@ -270,7 +270,7 @@ def hunting_map(
     columns = [np.array(column).reshape(shape) for column in zip(*rows, strict=True)]
     names = tuple(key.replace(".", "_") for key in keys)
     last = list(plain.shafts)[-1]
-    unit = {"units": plain.angle_unit(last)} if of == plain.angle_of(last) else {}
+    unit = {"units": plain.angle_unit(last)} if of == plain.variable(last, "angle") else {}
     about = [
         ("amplitude", {"long_name": f"amplitude of {of}", **unit}),
         ("frequency", {"long_name": "frequency of the limit cycle", "units": "Hz"}),

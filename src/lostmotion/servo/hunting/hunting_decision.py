@@ -99,7 +99,9 @@ class WatchedRun:
         self.frame = self.tick * ticks
         self._running = list(running_slots(control))
         self.noise = np.array([_noise(scenario, name) for name in self.names])
-        self._speeds = tuple(map(scenario.train().speed_of, scenario.train().shafts))
+        train = scenario.train()
+        self.units = ["m" if train.shaft_of(name, "angle") in scenario.slides else "rad" for name in self.names]
+        self._speeds = tuple(train.variable(shaft, "speed") for shaft in train.shafts)
         self.skipped = 0.0  # time that was extrapolated, not run [s]
         self.times = np.zeros(0)
         self.rows = np.zeros((0, len(self.names)))
@@ -314,8 +316,8 @@ def _value(points: Sequence[tuple[float, ...]], begin: float, time: float) -> fl
 def _noise(scenario: Scenario, name: str) -> float:
     """Motion by rounding of the angle or position of that name [rad] or [m]: of a slide as far as its fastest shaft moves it."""
     train = scenario.train()
-    slide = next((s for s in scenario.slides if train.angle_of(s) == name), None)
-    if slide is None:
+    slide = train.shaft_of(name, "angle")
+    if slide not in scenario.slides:
         return NOISE
     per_length = [abs(turns(train, shaft, slide) or 0.0) for shaft in scenario.shafts]
     return NOISE / (max(per_length, default=0.0) or 1.0 / TURN)
@@ -418,7 +420,7 @@ def _why(watch: WatchedRun, outlook: Outlook) -> str:
     k = moving[0]
     ratio = last[k] / max(before[k], last[k] * 1e-9)
     course = "as much as before" if 0.95 < ratio < 1.05 else f"{ratio:.3g} times as much as in the time before"
-    moved = practical(float(last[k]), "m" if watch.names[k].endswith("_position") else "rad", 3)
+    moved = practical(float(last[k]), watch.units[k], 3)
     return f"{watch.names[k].replace('_', ' ')} still moves by {moved}, {course}"
 
 
@@ -426,7 +428,7 @@ def moving_input(scenario: Scenario) -> str:
     """The name of an input that never comes to rest; empty if all do."""
     signals = {name: (s.sine_list(), s.breakpoint_list()[-1][2:]) for name, s in scenario.signals().items()}
     signals |= {
-        f"{motor}_reference": (c.reference.sine_list(), c.reference.pieces()[-1][2:])
+        scenario.train().variable(motor, "reference"): (c.reference.sine_list(), c.reference.pieces()[-1][2:])
         for motor, c in scenario.axes().items()
     }
     return next((name for name, (sines, slopes) in signals.items() if sines or any(slopes)), "")

@@ -125,7 +125,9 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
         return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
     first = max(watched_at_least(axis), axis.scenario.simulation.duration)
     with pole_named(axis):
-        watch = WatchedRun(axis.scenario, (axis.train.angle_of(axis.motor_shaft), axis.train.angle_of(axis.shaft)))
+        watch = WatchedRun(
+            axis.scenario, (axis.train.variable(axis.motor_shaft, "angle"), axis.train.variable(axis.shaft, "angle"))
+        )
         found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
     motor, load = 0.5 * found.swing
     ends = (float(found.range[0, 1]), float(found.range[1, 1]))

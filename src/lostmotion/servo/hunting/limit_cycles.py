@@ -82,8 +82,8 @@ class UndrivenLoop:
                 )
             settled = max(settled, time)
             constants.append(core_signal([(0.0, value, 0.0)]))
-        controlled, last = scenario.continuous(), list(scenario.train().shafts)[-1]
-        watched = f"{next(iter(controlled))}_error" if controlled else scenario.train().speed_of(last)
+        train, motor = scenario.train(), next(iter(scenario.continuous()), "")
+        watched = train.variable(motor, "error") if motor else train.variable(list(train.shafts)[-1], "speed")
         channels = tuple(name for name, *_ in core.channels())
         return cls(core, core_case(scenario), constants, settled, watched, channels, scenario)
 

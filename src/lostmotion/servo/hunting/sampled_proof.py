@@ -220,8 +220,8 @@ def _rate(contact: SampledSlip) -> float:
 
 def reached_by_run(axis: Axis, contact: SampledSlip, largest: float) -> float:
     """Error of the first stuck interval of the run that is not above one, in which all has settled; NaN where none is seen."""
-    name = contact.name.removesuffix("_contact")
-    angle = axis.train.angle_of(name)
+    name = axis.train.shaft_of(contact.name, "contact")
+    angle = axis.train.variable(name, "angle")
     to = axis.controller.reference.pieces()[-1][1] * (turns(axis.train, name, axis.shaft) or 1.0)
     watch, duration = WatchedRun(axis.scenario, (angle,)), axis.scenario.simulation.duration
     window = watch.window(contact.tick * contact.ramp.ticks)

@@ -200,14 +200,14 @@ class _Plant:
         )
         if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
             raise UndecidableError("it slips forward otherwise than in reverse")
-        row = np.eye(len(forward.states))[forward.states.index(train.speed_of(shaft))]
+        row = np.eye(len(forward.states))[forward.states.index(train.variable(shaft, "speed"))]
         friction = 0.5 * (forward.rate - reverse.rate)
         along = friction / (row @ friction)
         viscous = float(row @ forward.A @ along)
         turned = forward.A @ along - viscous * along
         if np.abs(forward.A @ turned).max() > NONE * np.abs(forward.A).max():
             raise UndecidableError("a gear or spring between its shafts is soft; take a rigid one")
-        k = forward.outputs.index(f"{shaft}_contact_torque")
+        k = forward.outputs.index(train.variable(shaft, "contact_torque"))
         sliding = float(0.5 * (forward.offset[k] - reverse.offset[k]))
         gain, push, lag = _torque(axis, still, forward, row, k)
         inertia = sliding / abs(float(row @ friction))
@@ -221,10 +221,10 @@ def _torque(
     axis: Axis, still: LinearModel, forward: LinearModel, speed: np.ndarray, contact: int
 ) -> tuple[float, float, float]:
     """Torque at the contact and acceleration of its shaft for a command of 1, and the time constant of the torque."""
-    u, current = forward.inputs.index(axis.train.command_of(axis.motor)), axis.controller.current
+    u, current = forward.inputs.index(axis.train.variable(axis.motor, "command")), axis.controller.current
     if not isinstance(current, FirstOrderCurrent):
         return float(still.D[contact, u]), float(speed @ forward.B[:, u]), 0.0
-    m = forward.states.index(axis.train.motor_torque_of(axis.motor))
+    m = forward.states.index(axis.train.variable(axis.motor, "torque"))
     torque = forward.B[m, u] * current.time_constant
     return float(still.C[contact, m] * torque), float(speed @ forward.A[:, m] * torque), current.time_constant
 
@@ -252,7 +252,7 @@ def _assembled(axis: Axis, plant: _Plant) -> SampledSlip:
     slip, push, stuck = _propagated(plant, tick, command, own)
     resolution, offset = _steps(axis, encoder)
     return SampledSlip(
-        name=f"{plant.shaft}_contact",
+        name=axis.train.variable(plant.shaft, "contact"),
         tick=tick,
         inertia=plant.inertia,
         viscous=plant.viscous,

@@ -90,7 +90,7 @@ def stick_slip(scenario: Scenario) -> StickSlip:
     still, forward, reverse = (_model(loop, shaft, way * SLIP_SPEED) for way in (0.0, 1.0, -1.0))
     if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
         raise UndecidableError("it slips forward otherwise than in reverse")
-    if [m.contacts[scenario.train().contact_of(shaft)] for m in (still, forward, reverse)] != [0, 1, -1]:
+    if [m.contacts[scenario.train().variable(shaft, "contact")] for m in (still, forward, reverse)] != [0, 1, -1]:
         raise UndecidableError("at small speeds the contact does not slip as one linear regime")
     return _Builder(loop, motor, shaft, still, forward, reverse).build(breakaway)
 
@@ -129,8 +129,8 @@ def only_contact(
             f"it has {len(dry)} dry contacts, {', '.join(contact['name'] for contact in dry)}, and the map is that of one"
         )
     name, ahead, back = (dry[0][key] for key in ("name", "capacity_forward", "capacity_backward"))
-    shaft = name.removesuffix("_contact")
-    if shaft not in train.shafts or ahead != back:
+    shaft = train.shaft_of(name, "contact")
+    if not shaft or ahead != back:
         raise UndecidableError(f"{name} is not the dry friction of a shaft, the same in both directions")
     if ahead == 0.0:
         raise UndecidableError(
@@ -211,10 +211,13 @@ class _Builder:
         if condition > ILL:
             raise UndecidableError(f"the modes of the slip are too near to each other (condition {condition:.1e})")
         inverse = np.linalg.inv(modes)
-        held, error = self.row(f"{self.shaft}_contact_torque", of=self.still), self.row(f"{self.motor}_error")
+        held, error = (
+            self.row(self.train.variable(self.shaft, "contact_torque"), of=self.still),
+            self.row(self.train.variable(self.motor, "error")),
+        )
         p, q, ramp, S, stuck_rates = self.settled(held, error)
         whole = np.linalg.inv(np.column_stack([p, q, self.unit_speed(), S]))
-        command, freed = self.row(self.train.command_of(self.motor)), S - np.outer(p, held @ S)
+        command, freed = self.row(self.train.variable(self.motor, "command")), S - np.outer(p, held @ S)
         sliding, rest = self.sliding(p), self.command_at_rest()
         sliding = breakaway if abs(breakaway - sliding) <= NONE * breakaway else sliding
         motor = self.loop.scenario.train().motors[self.motor]
@@ -222,12 +225,12 @@ class _Builder:
         if abs(command @ p) * breakaway > limit + 2.0 * abs(rest):
             raise AtRestError("the limit of the controller is below what frees the contact, so that it stays stuck")
         return StickSlip(
-            name=self.train.contact_of(self.shaft),
+            name=self.train.variable(self.shaft, "contact"),
             slip_rates=rates,
             rounding=1e-14 * condition,
             q=inverse @ q,
             p=inverse @ p,
-            speed=self.row(self.train.speed_of(self.shaft)) @ modes,
+            speed=self.row(self.train.variable(self.shaft, "speed")) @ modes,
             torque=whole[0] @ modes,
             error=whole[1] @ modes,
             held=held @ modes,
@@ -247,14 +250,14 @@ class _Builder:
 
     def unit_speed(self) -> np.ndarray:
         """The direction that the stuck regime leaves out."""
-        speed = self.row(self.train.speed_of(self.shaft))
+        speed = self.row(self.train.variable(self.shaft, "speed"))
         return np.asarray(speed / (speed @ speed))
 
     def settled(
         self, held: np.ndarray, error: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray, float, np.ndarray, np.ndarray]:
         """p, q, the rate of the ramp, and the modes of the stuck regime that settle, with their eigenvalues."""
-        within = _null(self.row(self.train.speed_of(self.shaft))[None, :])  # the contact does not move
+        within = _null(self.row(self.train.variable(self.shaft, "speed"))[None, :])  # the contact does not move
         A = within.T @ self.stuck @ within
         p = within @ _null(A)
         if p.shape[1] == _null(A @ A, float(np.linalg.norm(A)) ** 2).shape[1] and np.linalg.eigvals(
@@ -271,7 +274,7 @@ class _Builder:
         left = np.block(
             [[self.stuck, -p[:, None]], [error[None, :], np.zeros((1, 1))], [held[None, :], np.zeros((1, 1))]]
         )
-        left = np.vstack([left, np.append(self.row(self.train.speed_of(self.shaft)), 0.0)])
+        left = np.vstack([left, np.append(self.row(self.train.variable(self.shaft, "speed")), 0.0)])
         right = np.concatenate([np.zeros(n), [1.0, 0.0, 0.0]])
         solved, *_ = np.linalg.lstsq(left, right, rcond=None)
         if np.linalg.norm(left @ solved - right) > 1e-6 or not solved[-1] > 0.0:
@@ -299,7 +302,7 @@ class _Builder:
         state, *_ = np.linalg.lstsq(
             model.A / self.scale[:, None], -(self.constant + model.B @ values) / self.scale, rcond=None
         )
-        k = model.outputs.index(self.train.command_of(self.motor))
+        k = model.outputs.index(self.train.variable(self.motor, "command"))
         return float(model.C[k] @ state + model.D[k] @ values + model.offset[k])
 
 

@@ -11,7 +11,6 @@ from ... import _core
 from ...control.axis import OPEN_LOOP
 from ...errors import InputError
 from ...inputs.validation import did_you_mean, listed, shown
-from ...model.drive import DriveOfOneGear
 from ..scenario.scenario import Scenario
 from .batch_parameters import BatchParameters
 
@@ -46,12 +45,11 @@ class ExactBatch:
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
         self._given, self._count, self._steps = given, len(kind_of), 0
-        shorter = DriveOfOneGear.aliases.items() if given and scenarios[0].is_drive else ()
-        self._long = {short: long for long, short in shorter if short}
         rows = self._core.values
         self._variables: dict[str, np.ndarray] = dict(zip(self._core.variables, rows, strict=True))
-        self._variables |= {name: self._variables[long] for name, long in self._long.items() if long in self._variables}
-        moved = (f"{given}_given_speed", f"{given}_given_acceleration") if given else ()
+        train = scenarios[0].train()
+        moved = [train.variable(given, f"given_{what}") for what in ("speed", "acceleration")] if given else []
+        self._speed = train.variable(given, "speed") if given else ""
         self.inputs = tuple(name for name in self._core.inputs if name not in moved)
         self.reset(None, {})
 
@@ -101,18 +99,15 @@ class ExactBatch:
         """Take trains back to t = 0."""
         states = self._core.states
         start = np.zeros((self._count, len(states) + 1))
-        speed = f"{self._given}_speed" if self._given else ""
         for name, values in initial.items():
-            place = self._long.get(name, name)
-            columns = [
-                k for k, state in enumerate(states) if state == place
-            ]  # several, if several parts have that state
+            # Several, if several parts have that state.
+            columns = [k for k, state in enumerate(states) if state == name]
             if columns:
                 start[:, columns] = values[:, None]
-            elif place != speed and values.any():
+            elif name != self._speed and values.any():
                 raise InputError(f"initial.{name}: {shown(values.max())} is no state of these trains; leave it out")
-        if speed in initial:
-            start[:, -1] = initial[speed]
+        if self._speed in initial:
+            start[:, -1] = initial[self._speed]
         try:
             self._core.reset(which, start)
         except ValueError as problem:
@@ -121,12 +116,7 @@ class ExactBatch:
     @property
     def states(self) -> tuple[str, ...]:
         """Names of the state at t = 0."""
-        moved = (f"{self._given}_speed",) if self._given else ()
-        return tuple(
-            dict.fromkeys(
-                (*(s for s, long in self._long.items() if long in self._core.states), *self._core.states, *moved)
-            )
-        )
+        return tuple(dict.fromkeys((*self._core.states, *filter(None, [self._speed]))))
 
     def snapshot(self) -> Any:
         """State of all trains."""
@@ -147,7 +137,7 @@ def _train_of(scenario: Scenario, shaft: str | None) -> _core.Train:
             f"given_motion: {shown(shaft)} is no shaft or slide; {did_you_mean(shaft, known, listed(known))}"
         )
     loaded = [name for name in scenario.loaded() if name != shaft]
-    return scenario.long().core(loaded=loaded, given=(shaft,))
+    return scenario.core(loaded=loaded, given=(shaft,))
 
 
 def _control_of(scenario: Scenario) -> Any:

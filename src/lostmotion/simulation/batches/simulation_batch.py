@@ -135,7 +135,7 @@ class SimulationBatch:
             tuned = scenarios * (self._count // len(scenarios))
             self._core = ExactBatch(each, tuned, self._given, step)
         self._train, self._time = scenarios[0].train(), np.zeros(self._count)
-        loads = {self._train.load_torque_of(shaft) for shaft in self._train.shafts}
+        loads = {self._train.variable(shaft, "load_torque") for shaft in self._train.shafts}
         self._required = {name for name in self._core.inputs if name not in loads}
         self.reset(initial={name: value for name, value in initial.items() if name in self._core.states})
 
@@ -253,7 +253,7 @@ class SimulationBatch:
         shafts = list(self._train.shafts)
         if (of := shafts[-1] if shaft is None else shaft) not in shafts:
             raise InputError(f"shaft: {shown(of)} is none; {did_you_mean(of, shafts, f'those are {listed(shafts)}')}")
-        load = self._train.load_torque_of(of)
+        load = self._train.variable(of, "load_torque")
         if load not in self.inputs or (isinstance(self._core, WalkedBatch) and of != shafts[-1]):
             raise InputError(f"shaft: {shown(of)} has no load torque among {listed(self.inputs)}; give one that has")
         if command is not None:

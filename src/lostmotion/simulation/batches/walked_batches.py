@@ -46,25 +46,25 @@ class WalkedBatch:
         self._first, self._numbers = first, drive_keys(first)
         self.change(parameters, tuple(parameters), np.arange(count))
         ((motor, part),), ((gear, between),) = train.motors.items(), train.gears.items()
-        torque, output = train.motor_torque_of(motor), between.output
+        torque, output = train.variable(motor, "torque"), between.output
         states = (
             torque,
-            train.speed_of(part.shaft),
-            train.speed_of(output),
-            train.twist_of(gear),
-            train.angle_of(output),
+            train.variable(part.shaft, "speed"),
+            train.variable(output, "speed"),
+            train.variable(gear, "twist"),
+            train.variable(output, "angle"),
         )
         self._states = dict(zip(states, self._core.states, strict=True))
         self._computed = {
             torque: self._core.motor_torque,
-            train.output_torque_of(gear): self._core.output_torque,
-            train.contact_of(part.shaft): self._core.input_contact,
-            train.twist_contact_of(gear): self._core.twist_contact,
+            train.variable(gear, "output_torque"): self._core.output_torque,
+            train.variable(part.shaft, "contact"): self._core.input_contact,
+            train.variable(gear, "twist_contact"): self._core.twist_contact,
         }
         self._rigid = any(isinstance(g.stiffness, Rigid) for one in numbers for g in one.train().gears.values())
         self._angle = states[-1]
         self._count = count
-        self._given = train.command_of(motor), train.load_torque_of(output)
+        self._given = train.variable(motor, "command"), train.variable(output, "load_torque")
         self.inputs = self._given if first.loaded() else self._given[:1]
 
     @staticmethod

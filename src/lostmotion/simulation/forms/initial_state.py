@@ -53,10 +53,10 @@ def start_values(
     _check_flanks(train, speeds, twists)
     angles = angles_at_start(train, initial.of_all("angles"), twists, driven)
     _check_end_stops(train, speeds, angles)
-    values = {train.speed_of(name): v for name, v in speeds.items()}
-    values |= {train.angle_of(s): v for s, v in angles.items()}
-    values |= {train.twist_of(name): v for name, v in twists.items()}
-    values |= {train.motor_torque_of(name): v for name, v in initial.motor_torques.items()}
+    values = {train.variable(name, "speed"): v for name, v in speeds.items()}
+    values |= {train.variable(s, "angle"): v for s, v in angles.items()}
+    values |= {train.variable(name, "twist"): v for name, v in twists.items()}
+    values |= {train.variable(name, "torque"): v for name, v in initial.motor_torques.items()}
     return values
 
 

@@ -202,20 +202,6 @@ class TrainTables(ScenarioTables, LinearElements):
         element = self.brakes.get(name) or self.clutches.get(name)
         return command if element is None else element.acting(command)
 
-    def input_key(self, name: str) -> str:
-        """Key of the signal or reference that an input of the core stands for."""
-        if name.endswith("_load_force"):
-            slide = name.removesuffix("_load_force")
-            inclined = self.slides[slide].weight(1.0) != 0.0
-            return f"slides.{slide}.force" + (" and the weight" if inclined else "")
-        for suffix in ("_given_speed", "_given_acceleration", "_given_angle", "_given_position"):
-            if name.endswith(suffix):
-                return self.given_key(name.removesuffix(suffix))
-        for suffix, key in (("_load_torque", "shafts.{}.torque"), ("_reference", "controllers.{}.reference")):
-            if name.endswith(suffix):
-                return key.format(name.removesuffix(suffix))
-        return f"command.{name.removesuffix('_command').removesuffix('_current')}"
-
     def record_keys(self) -> Iterator[str]:
         """Keys that take names of records, and the conditions of their use."""
         for table, (key, _) in RECORDS.items():
@@ -250,11 +236,11 @@ class TrainTables(ScenarioTables, LinearElements):
             changes["initial"] = given["initial"].of_train()
         train, movers = self.train(), self.movers()
         if "command" in given:
-            names = {train.command_of(name): name for name in train.commanded()}
+            names = {train.variable(name, "command"): name for name in train.commanded()}
             name = names[only_input(train, "command", names)]
             changes["command"] = {**self.command, name: constant_or(given["command"], CommandSignal)}
         if "load_torque" in given:
-            names = {train.load_torque_of(name): name for name in self.loaded()}
+            names = {train.variable(name, "load_torque"): name for name in self.loaded()}
             name = names[only_input(train, "load_torque", names)]
             table, key, kind = (
                 ("slides", "force", ForceSignal) if name in self.slides else ("shafts", "torque", TorqueSignal)

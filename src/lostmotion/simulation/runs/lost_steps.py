@@ -9,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...inputs.arguments import checked
+from ...model.train import DriveTrain
 from ...reproducible import sin
-from ..forms.key_aliases import GEARBOX, LOAD
 from ..scenario.scenario import Scenario
+from ..variables_of_trains import angle_terms
 from .results import RunArrays, scenario_of
 
 if TYPE_CHECKING:
@@ -94,21 +95,19 @@ def found_in(scenario: Scenario, result: xarray.Dataset | RunArrays) -> tuple[Lo
     for name, motor in train.motors.items():
         if motor.kind != "stepper":
             continue
-        time, speed = (np.asarray(result[key]) for key in ("time", train.speed_of(motor.shaft)))
-        field = scenario.signals()[train.command_of(name)]
+        time, speed = (np.asarray(result[key]) for key in ("time", train.variable(motor.shaft, "speed")))
+        field = scenario.signals()[train.variable(name, "command")]
         lines = np.array(field.breakpoint_list())
-        course = _Course(time, _angle(scenario, motor.shaft, result), speed, lines, field.sine_list(), motor.full_step)
+        course = _Course(time, _angle(train, motor.shaft, result), speed, lines, field.sine_list(), motor.full_step)
         found.append(course.lost(name))
     return tuple(found)
 
 
-def _angle(scenario: Scenario, shaft: str, result: xarray.Dataset | RunArrays) -> np.ndarray:
-    """Angle of a shaft over a run [rad]; in the short form from that of the load."""
-    if not scenario.is_drive:
-        return np.asarray(result[scenario.train().angle_of(shaft)])
-    gear = scenario.gears[GEARBOX]
-    turned = np.asarray(result[f"{LOAD}_angle"]) + np.asarray(result["twist"])
-    return np.asarray(gear.ratio * turned)
+def _angle(train: DriveTrain, shaft: str, result: xarray.Dataset | RunArrays) -> np.ndarray:
+    """Angle of a shaft over a run [rad], from those that the run has."""
+    return np.asarray(
+        sum(factor * np.asarray(result[name]) for name, factor in angle_terms(train, shaft, result).items())
+    )
 
 
 @dataclass(frozen=True)

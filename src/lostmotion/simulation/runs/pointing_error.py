@@ -30,7 +30,7 @@ def pointed(scenario: Scenario) -> dict[str, tuple[PositionReference | SlideRefe
 def pointing_names(scenario: Scenario) -> Iterator[tuple[str, str]]:
     """Motor and name of the error, for each axis that follows a position."""
     for motor in pointed(scenario):
-        yield motor, f"{scenario.prefix(motor)}{NAME}"
+        yield motor, scenario.train().variable(motor, NAME)
 
 
 def pointing_errors(scenario: Scenario, result: RunArrays) -> dict[str, np.ndarray]:
@@ -56,7 +56,7 @@ def target(scenario: Scenario, motor: str, time: np.ndarray, start: float) -> np
 
 def _angle(scenario: Scenario, result: RunArrays, shaft: str) -> np.ndarray:
     train = scenario.train()
-    name = train.angle_of(shaft)
+    name = train.variable(shaft, "angle")
     if name in result:
         return result[name]
     (gear,) = train.gears.values()  # of a drive, whose results have no angle of the motor

@@ -276,9 +276,9 @@ def _explanation(
 ) -> Explanation:
     named = dict(zip((name for name, *_ in core.channels()), values, strict=True))
     slides = tuple(name for name in train.shafts if train.is_slide(name))
-    sliding = {train.contact_of(name) for name in slides}
-    sliding |= {train.twist_contact_of(n) for n, gear in train.gears.items() if train.is_slide(gear.output)}
-    sliding |= {f"{name}{END_STOP}_contact" for name in slides}
+    sliding = {train.variable(name, "contact") for name in slides}
+    sliding |= {train.variable(n, "twist_contact") for n, gear in train.gears.items() if train.is_slide(gear.output)}
+    sliding |= {train.variable(name + END_STOP, "contact") for name in slides}
     flanks, states = train.flanks(), []
     for contact in contacts:
         own: dict[str, Any] = {"slides": contact["name"] in sliding, "reach": None, "twist": 0.0}
@@ -291,7 +291,7 @@ def _explanation(
         name, motor = commands["name"], train.motors[commands["name"]]
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
-        command, torque = named[train.command_of(name)], named[train.motor_torque_of(name)]
+        command, torque = named[train.variable(name, "command")], named[train.variable(name, "torque")]
         given: dict[str, Any] = {"command_limit": limit, "slides": train.is_slide(motor.shaft)}
         turned.append(MotorState(**commands, **given, command=command, torque=torque))
     locking = tuple(_verdicts(train, named))
@@ -302,7 +302,7 @@ def _verdicts(train: DriveTrain, named: dict[str, float]) -> Iterator[SelfLockin
     if train.fixed_gears() != train.gears:
         return
     for name, gear in train.gears.items():
-        carried = abs(named[train.output_torque_of(name)])
-        torque = named.get(train.load_torque_of(gear.output), carried) or gear.rated_output_torque
+        carried = abs(named[train.variable(name, "output_torque")])
+        torque = named.get(train.variable(gear.output, "load_torque"), carried) or gear.rated_output_torque
         if torque and (verdict := self_locking(train, name, torque)).notable:
             yield verdict

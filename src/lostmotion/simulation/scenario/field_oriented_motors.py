@@ -13,6 +13,7 @@ from ...control.axis import BoundController, own
 from ...model.synchronous_motor import PhaseValues
 from .scenario import Scenario
 
+CURRENTS = ("direct_current", "quadrature_current")
 ATTRIBUTE = "error_bound"
 UNITS = {"current": "A", "torque": "N*m", "speed": "rad/s"}
 FEWEST = 10  # samples of the currents in an electrical revolution, by the rule of thumb of manufacturers of drives
@@ -20,22 +21,20 @@ AGREEMENT = 1e-10  # relative, to which the passes and rounding hold currents an
 
 
 def oriented(scenario: Scenario) -> Iterator[tuple[str, str, PhaseValues]]:
-    """Prefixes of the variables and of the speed of each motor under field-oriented control, and its winding."""
+    """Name and shaft of each motor under field-oriented control, and its winding."""
     for name, controller in scenario.axes().items():
         if controller.current.kind != "field_oriented":
             continue
         motor = scenario.train().motors[name]
-        prefix, shaft = scenario.prefix(name), motor.shaft
         assert motor.winding is not None
-        yield prefix, shaft, motor.winding.phase_values()
+        yield name, motor.shaft, motor.winding.phase_values()
 
 
 def set_torques(scenario: Scenario, data: dict[str, np.ndarray]) -> None:
     """Puts the torque that belongs to the currents in place of the straight lines that the mechanics were driven by."""
-    for prefix, _, phase in oriented(scenario):
-        data[f"{prefix or 'motor_'}torque"] = phase.torque(
-            data[f"{prefix}direct_current"], data[f"{prefix}quadrature_current"]
-        )
+    for name, _, phase in oriented(scenario):
+        torque, *currents = (scenario.train().variable(name, of) for of in ("torque", *CURRENTS))
+        data[torque] = phase.torque(*(data[current] for current in currents))
 
 
 def coarser(control: BoundController) -> BoundController:
@@ -61,14 +60,10 @@ def error_bound(scenario: Scenario, fine: Mapping[str, Any], coarse: Mapping[str
 def bounded(scenario: Scenario) -> dict[str, str]:
     """Variables that have an error bound. The value is the variable whose largest magnitude also scales the rounding error."""
     names: dict[str, str] = {}
-    for prefix, shaft, _ in oriented(scenario):
-        across, torque = f"{prefix}quadrature_current", f"{prefix or 'motor_'}torque"
-        names |= {
-            f"{prefix}direct_current": across,
-            across: across,
-            torque: torque,
-            scenario.train().speed_of(shaft): torque,
-        }
+    train = scenario.train()
+    for name, shaft, _ in oriented(scenario):
+        torque, along, across = (train.variable(name, of) for of in ("torque", *CURRENTS))
+        names |= {along: across, across: across, torque: torque, train.variable(shaft, "speed"): torque}
     return names
 
 
@@ -93,10 +88,12 @@ def bound_values(scenario: Scenario, attributes: Mapping[str, Any], samples: int
 def too_slow(scenario: Scenario, values: Mapping[str, Any]) -> str:
     """Warning of a sample time that is too long for the speed of the rotor in a run; empty if none is."""
     found = []
-    for prefix, shaft, phase in oriented(scenario):
-        motor = prefix.removesuffix("_") or "motor"
+    for motor, shaft, phase in oriented(scenario):
         controller = scenario.axes()[motor]
-        speed, time = float(np.max(np.abs(values[scenario.train().speed_of(shaft)]))), controller.loop_time("current")
+        speed, time = (
+            float(np.max(np.abs(values[scenario.train().variable(shaft, "speed")]))),
+            controller.loop_time("current"),
+        )
         turn = 2.0 * math.pi / (phase.pole_pairs * speed) if speed > 0.0 else math.inf
         if time * FEWEST > turn:
             found.append(

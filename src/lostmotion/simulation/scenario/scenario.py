@@ -335,21 +335,29 @@ class Scenario:
 
     def input_key(self, name: str) -> str:
         """Key of the signal or reference that an input stands for."""
-        for motor in self.tables.controllers:
-            if name == f"{self.prefix(motor)}reference":
+        train, tables = self.train(), self.tables
+        if shaft := train.shaft_of(name, "load_torque"):
+            weighs = train.is_slide(shaft) and tables.slides[shaft].weight(1.0) != 0.0
+            return self.load_key(shaft) + (" and the weight" if weighs else "")
+        if shaft := train.shaft_of(name, "given_speed", "given_acceleration", "given_angle"):
+            return self.own_key(tables.given_key(shaft))
+        for motor in tables.controllers:
+            if name == train.variable(motor, "reference"):
                 return f"{self.controller_key(motor)}.reference"
-        long = next((long for long, shown in self.train().aliases.items() if shown == name), name)
-        return self.own_key(self.tables.input_key(long))
+        names = (
+            n for n in train.commanded() if name in (train.variable(n, "command"), train.variable(n, "current_command"))
+        )
+        return self.own_key(f"command.{next(names)}")
+
+    def load_key(self, shaft: str) -> str:
+        """Key of the load torque on a shaft, or of the load force on a slide."""
+        return self.own_key(f"slides.{shaft}.force" if shaft in self.tables.slides else f"shafts.{shaft}.torque")
 
     def input_keys(self) -> dict[str, str]:
         """Keys of the signals of its inputs, by their names."""
-        train, movers = self.train(), self.tables.movers()
-        keys = {train.command_of(name): f"command.{name}" for name in train.commanded()}
-        keys |= {
-            train.load_torque_of(name): f"slides.{name}.force" if train.is_slide(name) else f"shafts.{name}.torque"
-            for name in movers
-        }
-        return {name: self.own_key(key) for name, key in keys.items()}
+        train = self.train()
+        keys = {train.variable(name, "command"): self.own_key(f"command.{name}") for name in train.commanded()}
+        return keys | {train.variable(name, "load_torque"): self.load_key(name) for name in self.tables.movers()}
 
     def prefix(self, motor: str) -> str:
         """Prefix of the names of the variables of a motor's controller."""
@@ -464,16 +472,20 @@ class Scenario:
         """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
         train, controllers = self.train(), self.continuous()
         commands = {
-            train.command_of(name): stepper_fields.acting(self.tables, name)
+            train.variable(name, "command"): stepper_fields.acting(self.tables, name)
             for name in self.commanded()
             if name not in controllers
         }
-        torques = {train.load_torque_of(name): load for name, load in self.tables.loads().items()}
+        torques = {train.variable(name, "load_torque"): load for name, load in self.tables.loads().items()}
         references = {name: s for motor, c in controllers.items() for name, s in c.signals(motor).items()}
         motions: dict[str, Signal[Any]] = {}
         for name, (speed, acceleration) in self.tables.motions().items():
-            motions |= {f"{name}_given_speed": speed, f"{name}_given_acceleration": acceleration}
-        currents = {f"{name}_current_command": level for name, level in stepper_fields.currents(self.tables).items()}
+            motions[train.variable(name, "given_speed")] = speed
+            motions[train.variable(name, "given_acceleration")] = acceleration
+        currents = {
+            train.variable(name, "current_command"): level
+            for name, level in stepper_fields.currents(self.tables).items()
+        }
         return {**commands, **currents, **torques, **motions, **references}
 
     @kept
@@ -522,7 +534,7 @@ class Scenario:
         for name, controller in self.continuous().items():
             shaft = self.tables.controlled(name)
             position = controller.reference.kind == "position"
-            measured = angles[shaft] if position else values.get(train.speed_of(shaft), 0.0)
+            measured = angles[shaft] if position else values.get(train.variable(shaft, "speed"), 0.0)
             values |= controller.start(name, measured)
             known += [f"{name}_{variable}" for variable in controller.system().states]
         for name in state.controller_states:

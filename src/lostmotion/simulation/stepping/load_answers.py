@@ -97,7 +97,7 @@ class SimulationAnswers(SimulationReadings):
         number = self._loaded_shaft(shaft)
         begin, end = self._begin_and_end(command, load_torque, inputs)
         inertia, acceleration, compliance = self._step(interval, begin, end, number)
-        load = self._input_places[self._train.load_torque_of(shaft)]
+        load = self._input_places[self._train.variable(shaft, "load_torque")]
         torque = inertia * acceleration + 0.5 * (begin[load] + end[load])
         return LoadAnswer(torque, inertia - 1.0 / compliance if compliance > 0.0 else -math.inf, acceleration)
 

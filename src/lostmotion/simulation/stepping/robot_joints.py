@@ -76,8 +76,12 @@ class JointDrive:
         """Power that the friction of the gears takes now [W], w_1 (T_1 - T_2/i) of each, with the speed against its housing."""
         s, train, total = self.simulation, self.simulation._train, 0.0
         for name, gear in train.gears.items():
-            speed = s[train.speed_of(gear.input)] - (s[train.speed_of(gear.housing)] if gear.housing else 0.0)
-            total += speed * (s[train.input_torque_of(name)] - s[train.output_torque_of(name)] / gear.ratio)
+            speed = s[train.variable(gear.input, "speed")] - (
+                s[train.variable(gear.housing, "speed")] if gear.housing else 0.0
+            )
+            total += speed * (
+                s[train.variable(name, "input_torque")] - s[train.variable(name, "output_torque")] / gear.ratio
+            )
         return total
 
     def ratios(self) -> dict[str, float]:
@@ -154,8 +158,8 @@ def _command(scenario: Scenario, inputs: Sequence[str]) -> tuple[int | None, flo
     if scenario.axes():
         return None, 1.0
     if scenario.continuous():
-        return inputs.index(f"{name}_reference"), 1.0
-    command = train.command_of(name)
+        return inputs.index(train.variable(name, "reference")), 1.0
+    command = train.variable(name, "command")
     return inputs.index(command), 1.0 / motor.rated_torque if motor.kind == "torque_source" else 1.0
 
 

@@ -131,7 +131,7 @@ class Simulation(SimulationAnswers):
         self._input_units = {name: unit.removeprefix("1") for name, _, unit, _ in channels}
         # Inputs that are commands of brakes and clutches.
         self._shares = {
-            self._train.command_of(name) for name in self._train.commanded() if name not in self._train.motors
+            self._train.variable(name, "command") for name in self._train.commanded() if name not in self._train.motors
         }
         self._variables: tuple[Variable, ...] = variables_of_core(core.variables())
         following = (v.name for v in self._variables if v.derived)
@@ -174,13 +174,16 @@ class Simulation(SimulationAnswers):
         """Slots of the core for the inputs of `advance`."""
         self._inputs = len(names)
         self._motions = {  # speed and acceleration of each shaft
-            name: (names.index(f"{name}_given_speed"), names.index(f"{name}_given_acceleration"))
+            name: (
+                names.index(self._train.variable(name, "given_speed")),
+                names.index(self._train.variable(name, "given_acceleration")),
+            )
             for name in self._given
         }
         motions = {k for places in self._motions.values() for k in places}
         controlled = self._controlled()
         self._input_places = {name: k for k, name in enumerate(names) if name not in controlled and k not in motions}
-        loads = {self._train.load_torque_of(shaft) for shaft in self._loaded}
+        loads = {self._train.variable(shaft, "load_torque") for shaft in self._loaded}
         self._required = [name for name in self._input_places if name not in loads]
         self._only: dict[str, str] = {}  # what `advance` calls so
 
@@ -262,7 +265,7 @@ class Simulation(SimulationAnswers):
         return {**self._controllers, **self._scenario.continuous()}
 
     def _controlled(self) -> set[str]:
-        return {self._train.command_of(motor) for motor in self._controllers}
+        return {self._train.variable(motor, "command") for motor in self._controllers}
 
     @property
     def time(self) -> float:
@@ -371,7 +374,7 @@ class Simulation(SimulationAnswers):
             courses = {}
             for name, given in wanted.items():
                 to_angle = given.get("position", given.get("angle"))
-                angle = 0.0 if to_angle is None else self._value(self._train.angle_of(name), values)
+                angle = 0.0 if to_angle is None else self._value(self._train.variable(name, "angle"), values)
                 speed, acceleration = (self._value(f"{name}_{what}", values) for what in ("speed", "acceleration"))
                 courses[name] = _core.MotionCourse(
                     to_angle=to_angle,

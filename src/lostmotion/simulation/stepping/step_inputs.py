@@ -76,8 +76,7 @@ def no_interval(time: float, interval: float) -> InputError:
 
 def no_input(train: DriveTrain, inputs: Sequence[str], name: str) -> InputError:
     """Refusal of an input that `advance` is given."""
-    shaft = name.removesuffix("_load_torque").removesuffix("_load_force")
-    if shaft in train.shafts and name == train.load_torque_of(shaft):
+    if shaft := train.shaft_of(name, "load_torque"):
         word = train.torque_word(shaft)
         kind = "slide" if word == "force" else "shaft"
         return InputError(f'{name}: no load {word} acts on this {kind}; make the simulation with loaded=["{shaft}"]')

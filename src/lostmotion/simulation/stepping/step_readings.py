@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...inputs.validation import did_you_mean, shown
 from ...model.synchronous_motor import PhaseValues
 from ...model.train import DriveTrain
-from ..scenario.field_oriented_motors import oriented
+from ..scenario.field_oriented_motors import CURRENTS, oriented
 from ..scenario.scenario import Scenario
 from ..variables import Variable
 from ..variables_of_trains import ALL_SIGNALS, WINDING_SIGNALS, axis_variables, signals_of
@@ -60,15 +60,16 @@ class SimulationReadings:
             self._signals |= {
                 f"{prefix}{name}": k * len(names) + n for n, name in enumerate(names) if name in shown_here
             }
-        for prefix, _, phase in oriented(scenario):
-            self._derived[f"{prefix or 'motor_'}torque"] = self._torque_of(prefix, phase)
-            self._channel = {n: c for n, c in self._channel.items() if n != f"{prefix or 'motor_'}torque"}
+        train = scenario.train()
+        for motor, _, phase in oriented(scenario):
+            torque, *currents = (train.variable(motor, of) for of in ("torque", *CURRENTS))
+            self._derived[torque] = self._torque_of(currents, phase)
+            self._channel = {n: c for n, c in self._channel.items() if n != torque}
         self._variables += axis_variables(scenario.by_prefix(), scenario.sliding())
 
-    def _torque_of(self, prefix: str, phase: PhaseValues) -> Derived:
+    def _torque_of(self, currents: list[str], phase: PhaseValues) -> Derived:
         def torque(values: list[float]) -> float:
-            i_d, i_q = (self._value(f"{prefix}{axis}_current", values) for axis in ("direct", "quadrature"))
-            return float(phase.torque(i_d, i_q))
+            return float(phase.torque(*(self._value(current, values) for current in currents)))
 
         return torque
 

@@ -40,7 +40,7 @@ class Electrical:
         torque = result["motor_torque"][here]
         if m.kind == "stepper":
             return cls._of_stepper(m, torque)
-        oriented = oriented_amplitudes(result, "motor")
+        oriented = oriented_amplitudes(scenario, result, "motor")
         if oriented is not None:
             assert m.winding is not None
             phase = m.winding.phase_values()

@@ -69,4 +69,6 @@ def _commands(scenario: Scenario) -> list[str]:
     last, motors = list(train.shafts)[-1], scenario.train().motors
     if len(motors) != 1 or scenario.tables.controllers or scenario.given():
         return []
-    return [train.command_of(name) for name, motor in motors.items() if turns(train, motor.shaft, last) is not None]
+    return [
+        train.variable(name, "command") for name, motor in motors.items() if turns(train, motor.shaft, last) is not None
+    ]

@@ -389,7 +389,7 @@ class Axes:
             of_motor = [*speed_of_stepper(m, duty.peak_input_speed), *stepper_rules(made.scenario, MOTOR, result)]
             return self._with_others(row, of_motor, made)
         command = command_of_run(m, made.scenario.controller, command, torque, speed)
-        oriented = oriented_amplitudes(result, "motor")
+        oriented = oriented_amplitudes(made.scenario, result, MOTOR)
         of_motor = [
             largest_speed(m, duty.peak_input_speed, slides=slides),
             *peak_torque(m, torque, slides=slides),
