@@ -26,7 +26,7 @@ class Problem(NamedTuple):
 
     keys: tuple[str, ...]  # dotted keys of these; none where it concerns all that was given
     reason: str  # the value, what is wrong with it, and the remedy
-    table: str = ""  # the table that a record fills, where the fault is that of a record
+    table: str = ""  # the table that a record fills, where the record is at fault
     record: str = ""  # this record, as messages name it
 
     def sentence(self) -> str:
@@ -111,7 +111,7 @@ def inside(table: str) -> AbstractContextManager[None]:
 
 
 def prefixed(where: object) -> AbstractContextManager[None]:
-    """Errors within begin with a file, log or function, or the key of a table of it."""
+    """Errors within begin with a file, log or function, or with a key."""
 
     def change(error: InputError) -> InputError:
         whole = f"{where}: {error.where}" if error.where else str(where)

@@ -22,7 +22,7 @@ _LINE = re.compile(r"from (\.[\w.]*) import (\w+) as \2\n")
 _RENAMED = {"DriveScenario": "Scenario", "TrainScenario": "Scenario"}
 
 when_taken: list[Callable[[ModuleType], None]] = []
-"""called with each module of which a public name is taken"""
+"""functions to call with each module from which a public name is taken"""
 
 
 def homes_of(package: str) -> dict[str, str]:
@@ -32,7 +32,7 @@ def homes_of(package: str) -> dict[str, str]:
 
 
 def namespace(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
-    """`__getattr__` and `__dir__` of a package whose public names are those of its stub."""
+    """`__getattr__` and `__dir__` of a package whose public names are listed in its stub."""
     homes: dict[str, str] = {}
 
     def known() -> dict[str, str]:

@@ -1,9 +1,9 @@
 """Numbers that record how they are computed of others.
 
 The core derives a scenario anew from changed values without Python: it has the formulas that Python computes the numbers of the
-core by. They are recorded while Python does so once. `Recorded` is a float that adds to a tape what is computed of it. Where such
-a number is passed on as a plain float, as to the core, it is known again by its last bits, which are its own: its `mark`.
-A comparison is recorded too. The formulas hold as long as it turns out as it did.
+core by. They are recorded while Python does so once. `Recorded` is a float that records on a tape what is computed from it.
+Where such a number is passed on as a plain float, as to the core, it is known again by its last bits, which are its own: its
+`mark`. A comparison is recorded too. The formulas hold as long as it turns out as it did.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Tape:
         return holds
 
     def formula_of(self, x: float) -> int:
-        """The formula of a number: its own, that of its mark, or a constant."""
+        """The formula of a number: its own, its mark's, or a constant."""
         known = x if isinstance(x, Recorded) else self.marked.get(float(x))
         return self._formula("constant", 0, 0, float(x)) if known is None else known.formula
 

@@ -79,7 +79,7 @@ def again(scenario: str, overrides: list[str] | None) -> str:
 
 
 def _numbers_of(key: str, value: Any) -> Iterator[tuple[str, str]]:
-    """The bare numbers of a value, as text, with their dotted keys: those of lists and tables too."""
+    """The bare numbers of a value, as text, with their dotted keys: numbers in lists and tables too."""
     if isinstance(value, dict | list):
         for name, entry in value.items() if isinstance(value, dict) else enumerate(value):
             yield from _numbers_of(f"{key}.{name}", entry)

@@ -50,7 +50,7 @@ def main() -> None:
     """Entry point: known errors end in one line and exit code 1, Ctrl-C in 130."""
     gc.set_threshold(
         100_000
-    )  # loading makes many objects that stay; looking through them again and again takes a tenth of it
+    )  # loading makes many objects that stay; collecting them again and again takes a tenth of the time
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search of all that is installed
     # Matrices are so small that the threads of BLAS take more time than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")

@@ -54,8 +54,8 @@ def study(
     """Run many variants: vary parameters, store results, resume.
 
     The directory given by -o holds Parquet files, one row a run, that pandas, DuckDB and polars open directly. Prints a summary.
-    Failed runs have their reasons in the column error, and the exit code is 1. A study with a table [select] has a verdict. `show` prints the summary of a directory; with -o,
-    it writes study.html (one page) and its tables into another one.
+    Failed runs have their reasons in the column error, and the exit code is 1. A study with a table [select] has a verdict.
+    `show` prints the summary of a directory; with -o, it writes study.html (one page) and its tables into another one.
 
     \b
     lostmotion study examples/tolerance.toml -o tolerance
@@ -141,7 +141,7 @@ def _show(directory: Path, best: str | None, output: Path | None, figures: str |
 
 
 def print_outcome(directory: Path, total: int) -> None:
-    """Print the summary, the directory of the runs, and the failed ones; the exit code is that of the verdict, if runs are selected."""
+    """Print the summary, the directory of the runs, and the failed ones; if runs are selected, the exit code follows the verdict."""
     from ..reports.study import summary
     from ..studies.runs.read_table import failures
     from ..units.practical import counted

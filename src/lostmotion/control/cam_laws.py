@@ -1,8 +1,8 @@
 """Laws of motion of VDI 2143: moves from rest to rest in a given duration.
 
 A law is the shape of its acceleration over the first half of a move; the second half mirrors it. The shape is linear between
-`PIECES` + 1 instants, so that a move consists of pieces of constant jerk. Its acceleration differs from that of the law by less
-than a thousandth of the peak.
+`PIECES` + 1 instants, so that a move consists of pieces of constant jerk. Its acceleration differs from the law's
+acceleration by less than a thousandth of the peak.
 """
 
 from __future__ import annotations

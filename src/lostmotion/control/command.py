@@ -1,4 +1,4 @@
-"""Commands of motors, brakes and clutches; those of steppers are made of the steps of a driver."""
+"""Commands of motors, brakes and clutches; commands of steppers are made of the steps of a driver."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ Side = Literal["left", "right"]
 class Stepping(Part):
     """Driver of a stepper, which turns a position into steps.
 
-    The field stands at a whole number of microsteps. It moves on by one where the reference is half a microstep ahead of it, and starts where the
-    rotor is at t = 0.
+    The field stands at a whole number of microsteps. The field advances by one microstep where the reference is half
+    a microstep ahead, and starts where the rotor is at t = 0.
 
     Examples
     --------

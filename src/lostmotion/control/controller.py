@@ -55,7 +55,7 @@ class Controller(ReferenceBlocks):
     law: Switch = False
     """the loops are a function of your own, which `simulate(..., law=function)` gives"""
     phase: Annotated[Time, NotNegative] = 0.0
-    """by which the samples of the position loop come after those of the others"""
+    """by which the samples of the position loop come after the samples of the other loops"""
     kind: Literal["sampled"] = "sampled"
     reference: AnyReference
     """reference of the position, the speed or the torque, which the outermost loop follows; with a camera, the path of the target"""

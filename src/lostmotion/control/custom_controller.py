@@ -29,7 +29,7 @@ class Law:
     ``reference`` is (value, first, second, third derivative). ``command`` is in the unit of `[command]`: 1 is rated
     torque, or with ``current.kind = "voltage"`` rated voltage. With ``current.kind = "field_oriented"`` ``measured``
     also has i_d and i_q [A]. The command is the pair u_d, u_q [V] in coordinates of the rotor as it is read now. The
-    inverter advances its angle to that of the rotor in the middle of the time that the voltage acts, and holds the
+    inverter advances its angle to the rotor's angle in the middle of the time that the voltage acts, and holds the
     voltage in the stator.
     """
 
@@ -85,7 +85,7 @@ def _address_of(data: Any) -> int:
 
 
 def as_laws(law: Any, axes: Mapping[str, Any]) -> dict[str, Law]:
-    """Laws by the name of the controller: one alone is that of the only controller.
+    """Laws by the name of the controller: a single law belongs to the only controller.
 
     Raises InputError: a controller with ``law = true`` has none, or one without has one.
     """

@@ -38,7 +38,7 @@ from .targets import Circle, FlyBy, Star, Track, Weave
 S = TypeVar("S")  # the rate of a value, with its unit
 A = TypeVar("A")  # its second derivative
 J = TypeVar("J")  # its third derivative
-M = TypeVar("M")  # a move of it
+M = TypeVar("M")  # one move of a reference
 
 SHORTEST = 1e-6  # share of a move that the rounding of its instants may be
 

@@ -6,7 +6,7 @@ from ..model.train import DriveTrain
 
 
 def turns(train: DriveTrain, start: str, end: str) -> float | None:
-    """Ratio of the turns of shaft `start` to those of `end`, through gears and clutches; None without a path."""
+    """Turns of shaft `start` for one turn of shaft `end`, through gears and clutches; None without a path."""
     found, waiting = {start: 1.0}, [start]
     joints = [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()]
     joints += train.held_together()

@@ -1,7 +1,7 @@
 """Targets that a pointing axis follows: their paths in space, and the angles under which they are seen.
 
-Coordinates are those of the station: x to the right of the bearing 0, y along it, z up. Angles: traverse A = atan2(x, y), to the
-right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are those of the path itself, by truncated Taylor series.
+Coordinates refer to the station: x to the right of the bearing 0, y along it, z up. Angles: traverse A = atan2(x, y), to the
+right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are derivatives of the path itself, by truncated Taylor series.
 """
 
 import math

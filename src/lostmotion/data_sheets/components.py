@@ -42,8 +42,8 @@ def gearbox_table(
 ) -> tuple[dict[str, Any], BuiltMap | None]:
     """Values of `[gearbox]`, or of the table `where`, for a record with `changes`, and the loss map's origin.
 
-    A change replaces the value that it names and nothing else. The hysteresis stays that of the record as printed,
-    also if the stiffness is changed or wear adds backlash.
+    A change replaces the value that it names and nothing else. The hysteresis stays as the record prints it, also if
+    the stiffness is changed or wear adds backlash.
 
     Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
@@ -114,7 +114,7 @@ def _naming(where: str) -> str:
 
 
 def _with(sheet: S, values: Mapping[str, Any]) -> S:
-    """A sheet with other values, and with the notes that are still true of it."""
+    """A sheet with other values, and with the notes that still hold for these values."""
     if not values:
         return sheet
     given = {name: getattr(sheet, name) for name in sheet.model_fields_set}
@@ -266,9 +266,9 @@ def actuator(
     name : str
         Name of a record in the catalogue, or a file (``.toml``) with one record.
     rotor_inertia : float, optional
-        Inertia of the rotor [kg·m²] in place of that of the record.
+        Inertia of the rotor [kg·m²] in place of the record's value.
     efficiency : float, optional
-        Efficiency of the gearbox at rated load, in place of that of the record or of the estimate for its kind.
+        Efficiency of the gearbox at rated load, in place of the record's value or the estimate for its kind.
 
     Returns
     -------
@@ -315,7 +315,7 @@ OF_STEPPERS = ("steps_per_revolution", "holding_torque", "detent_torque")
 
 
 def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor") -> dict[str, Any]:
-    """Values of `[motor]`, or of the table `where`, for a record with `changes`, each of which takes the place of what it names.
+    """Values of `[motor]`, or of the table `where`, for a record with `changes`. Each change replaces the value that it names.
 
     Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
@@ -408,7 +408,7 @@ def built_in_brake(motor: str) -> dict[str, Any]:
 
 
 def _accessory(kind: str, table: Mapping[str, Any]) -> dict[str, Any]:
-    """Values of `task.brake` or `task.amplifier` with those of the record that it names; the other keys go before them."""
+    """Values of `task.brake` or `task.amplifier`, merged with the values of the record that it names; the other keys go before them."""
     from .records import find
 
     record = find(table["from"], kind)

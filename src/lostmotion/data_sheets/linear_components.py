@@ -24,7 +24,7 @@ class ScrewConditions(Part):
 
 
 def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: str) -> dict[str, Any]:
-    """Values of the table `where` for a record with `changes`, each of which takes the place of what says the same.
+    """Values of the table `where` for a record with `changes`. Each change replaces the keys that give the same quantity.
 
     kind: ``"screw"``, ``"rack"``, ``"belt"`` or ``"linear_motor"``.
 

@@ -46,9 +46,9 @@ class LinearSheet(Record):
 
     PART: ClassVar[type[Part]]  #: the values of the table of a scenario
     ALTERNATIVES: ClassVar[Alternatives] = ()
-    """sets of keys, each of which says the same: one that is given beside `from` takes the place of the others"""
+    """sets of keys, where each key gives the same quantity: one that is given beside `from` takes the place of the others"""
     PARTNERS: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """for some keys those of which one must be given too; without them they are data for nothing but the list"""
+    """for some keys the other keys, one of which must be given too; without them they are data for nothing but the list"""
     CHOICES: ClassVar[dict[str, str]] = {}  #: values that no record can state, since they depend on the axis
 
     def values(self) -> dict[str, Any]:

@@ -25,7 +25,7 @@ from .loss_data import EfficiencyPoint, LossData
 
 # Where no datum at all says what an unloaded gearbox loses: this share of the loss at rated load.
 ASSUMED_NO_LOAD_SHARE = 0.2
-# Friction of standstill gives way to that of motion within this relative speed.
+# Static friction is blended into the friction of motion within this relative speed.
 STATIC_TO_RUNNING = 0.01
 # Palmgren's load-independent bearing torque goes with viscosity to this power (A. Palmgren, Grundlagen der
 # Wälzlagertechnik, 1957).
@@ -54,8 +54,8 @@ def build_loss_map(
     sheet : GearboxSheet
         The data sheet.
     temperature : float, optional
-        Temperature of the lubricant [°C]. Default: the temperature of the data. It changes the loss without load, by the given curves if the
-        sheet has them at several temperatures, else by the viscosity of its lubricant.
+        Temperature of the lubricant [°C]. Default: the temperature of the data. It changes the loss without load, by the
+        given curves if the sheet has them at several temperatures, else by the viscosity of its lubricant.
     loss_factor : float
         Factor of all losses, for wear.
 

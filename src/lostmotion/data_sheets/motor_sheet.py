@@ -68,7 +68,7 @@ class MotorSheet(MotorHeat, Record):
     electrical_time_constant: Annotated[Time, Positive] | None = None
     max_speed: Annotated[Speed, Positive] | None = None
     max_inertia_ratio: Annotated[Number, Positive] | None = None
-    """largest inertia of the load relative to that of the rotor"""
+    """largest inertia of the load relative to the rotor's inertia"""
     steps_per_revolution: Annotated[Number, Positive] | None = None
     """full steps of a stepper"""
     holding_torque: Annotated[Torque, Positive] | None = None
@@ -200,7 +200,7 @@ class MotorSheet(MotorHeat, Record):
     def synchronous(self) -> Motor:
         """A brushless motor with field orientation in place of block commutation, its rated voltage as the dc voltage.
 
-        Resistance and inductance of a sheet are those between two terminals. Its torque constant is that of block
+        Resistance and inductance of a sheet are those between two terminals. The torque constant is the one of block
         commutation, (3 sqrt(3)/pi) p psi. The voltage is taken to be sinusoidal.
 
         Raises

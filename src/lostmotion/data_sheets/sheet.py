@@ -47,7 +47,7 @@ class Source(Remark):
     data: tuple[str, ...]
     """keys of the record that it covers"""
     status: Annotated[Literal["manufacturer", "transcription", "inferred", "identified"], BeforeValidator(current_word)]
-    """read in the manufacturer's own text, in somebody's transcription of it, concluded from other data, or identified from measured logs"""
+    """read in the manufacturer's own text, transcribed by somebody else, concluded from other data, or identified from measured logs"""
     text: str
 
 
@@ -76,7 +76,7 @@ class Record(Part):
     gaps: tuple[Gap, ...] = ()
 
     NEEDS: ClassVar[dict[str, tuple[str, ...]]] = {}
-    """data that a run, or the rule on this kind, requires; for each the alternative keys, of which one is enough"""
+    """data that a run, or the rule on this kind, requires; for each key the alternative keys; one of them is enough"""
 
     def given(self) -> list[str]:
         """Dotted keys of all data that are given."""

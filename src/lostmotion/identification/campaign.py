@@ -211,7 +211,7 @@ def identification(gearbox: Gearbox, title: str = "", ripple: TorqueHarmonic | N
         },
         "parameters": {name: _free(name, value) for name, value in values.items()},
         **_ladder(gearbox, values),
-        # Without hysteresis the errors are those of the sensors alone; with it, the long errors of runs that turn at other instants
+        # Without hysteresis the sensors alone cause the errors; with it, the long errors of runs that turn at other instants
         # have minima in which the linear loss stays.
         "fit": {
             "loss": "huber" if _has_hysteresis(gearbox) else "linear",

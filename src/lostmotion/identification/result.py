@@ -43,7 +43,7 @@ class IdentificationResult:
     at_bounds: list[str]
     """parameters that have ended at a bound"""
     notes: dict[str, tuple[str, ...]]
-    """by log: what was dropped of it, and what looks wrong"""
+    """by log: notes on dropped samples, and on what looks wrong"""
     left_out: dict[str, str] = field(default_factory=dict, kw_only=True)
     """by log that cannot be used: why"""
     inputs: list[str] = field(default_factory=list, kw_only=True)

@@ -139,7 +139,7 @@ def _read(name: str, value: Any, annotation: str, known: Mapping[str, Any]) -> A
 
 @cache
 def _options(annotation: str) -> tuple[str, ...]:
-    """The parts of a union; what stands in brackets is no part of it."""
+    """The parts of a union; a bar within brackets separates no parts."""
     parts, depth, begin = [], 0, 0
     for k, c in enumerate(annotation):
         depth += {"[": 1, "]": -1}.get(c, 0)

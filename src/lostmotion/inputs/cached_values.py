@@ -52,5 +52,5 @@ def kept_while_used(method: Callable[[P], R]) -> Callable[[P], R]:
 
 
 def keep(part: Keeper, function: Any, value: Any) -> None:
-    """Keeps with a part what a `kept` function of it would make."""
+    """Store the value of a `kept` function with a part."""
     part.kept_values()[function.__wrapped__] = value

@@ -1,4 +1,4 @@
-"""Resources that an HDF5 file requires of its reader, checked before anything of it is read."""
+"""Resources that an HDF5 file requires of its reader, checked before any data are read."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def _collect(path: Path, group: Any, where: str, found: dict[str, Any], depth: i
 
 
 def _needed(node: Any) -> float:
-    """Bytes that a dataset needs, and those of one of its chunks while it is decompressed."""
+    """Bytes that a dataset needs, and bytes of one of its chunks while it is decompressed."""
     chunk = 1.0
     for length in node.chunks or (0,):
         chunk *= length

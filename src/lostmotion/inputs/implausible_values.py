@@ -38,7 +38,7 @@ LARGEST: dict[str, Usual] = {
     "rotor_inertia": Usual(10.0, "kg*m^2", "kg*cm^2"),
     "ambient_temperature": Usual(150.0, "degC", "K"),
 }
-"""by key; gaps and errors of a task may be those of a slide in m, of which 0.09 is as much too large"""
+"""by key; gaps and errors of a task may belong to a slide, in m, for which 0.09 is as much too large"""
 
 
 class ValueWarning(UserWarning):

@@ -30,7 +30,7 @@ MAX_DEPTH = 100  # parts inside of parts, which functions that call themselves c
 
 
 def syntax_tree(text: str, kind: str, remedy: str = "") -> ast.expr:
-    """The syntax tree of an expression, not too large to be walked. Nothing of it is run.
+    """The syntax tree of an expression, not too large to be walked. The text is never run.
 
     kind: what it is in messages, such as ``"a formula"``.
     remedy: clause on what to do with one that is too long or nested too deeply.

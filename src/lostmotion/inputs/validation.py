@@ -25,7 +25,7 @@ MAX_NAME = 100  # characters of a name that another one is looked for
 MAX_NEAR = 20  # places, or misspelt keys, that are looked at for what was meant
 MAX_LISTED = 120  # characters of a list of names
 MAX_LINE = 240  # characters of several problems in one line
-WORD_CUTOFF = 0.7  # likeness of two words of which one is taken for the other, misspelt
+WORD_CUTOFF = 0.7  # least likeness of two words, above which one is taken for the other, misspelt
 JOINED_CUTOFF = 0.92  # of two names, where words run together or fall apart
 
 
@@ -33,7 +33,7 @@ def refusal(error: ValidationError, schema: Mapping[str, Any], subject: str, giv
     """The error of a failed validation. Names all keys that are missing, and no key that follows from a misspelt one.
 
     schema: JSON Schema of the part that was to be made.
-    subject: what it is, as in ``"the scenario"``, for what is wrong with all of it.
+    subject: subject of a message on the whole, such as ``"the scenario"``.
     given: what it was to be made of, so that a value is shown as it was written.
     """
     found = error.errors(include_url=False)
@@ -105,7 +105,7 @@ def beginning(text: str) -> str:
 def nearest(given: str, choices: Iterable[str]) -> str:
     """The choice that was misspelt as what was given; empty if none was.
 
-    A name with another word in it, or with one more, is that of another quantity: backlash is no added_backlash, and a
+    A name with another word in it, or with one more, names another quantity: backlash is no added_backlash, and a
     rated_current no rated_torque. One that is related to something else, or to nothing, is meant: steps are
     steps_per_revolution, as are steps_per_rev.
     """
@@ -128,7 +128,7 @@ def _words(name: str) -> list[str]:
 
 
 def _likeness(given: list[str], choice: list[str]) -> float:
-    """0 where they have other words; else that of all of them."""
+    """0 where they have other words; else the line of all of them."""
     joined = difflib.SequenceMatcher(None, "".join(given), "".join(choice))
     if joined.real_quick_ratio() < WORD_CUTOFF:
         return 0.0

@@ -1,4 +1,4 @@
-"""Resources that a ZIP archive requires of its reader, checked before anything of it is decompressed."""
+"""Resources that a ZIP archive requires of its reader, checked before any file is decompressed."""
 
 from __future__ import annotations
 

@@ -60,7 +60,7 @@ def reference_sliders(
 
     key: table of the reference in the scenario file.
     number: among the controllers.
-    sliding: whether the motor moves a slide, and whether the position is that of one.
+    sliding: whether the motor moves a slide, and whether the position is the position of a slide.
     """
     reference = controller.reference
     positions = sliding[1] and reference.kind != "torque"

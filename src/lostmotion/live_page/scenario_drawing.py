@@ -88,7 +88,7 @@ def axis_figures(
     """Charts over time of a controller.
 
     named: its variables begin with the name of its motor.
-    sliding: whether the motor moves a slide, and whether the position is that of one.
+    sliding: whether the motor moves a slide, and whether the position is the position of a slide.
     """
     prefix, of = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
     kind = controller.reference.kind

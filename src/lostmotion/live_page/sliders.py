@@ -48,7 +48,7 @@ class Slider:
         return shown | vars(self.range) | {"unit": unit, "factor": factor}
 
 
-# SI unit -> units that are shown, from the largest one on, each with what one of it is in SI and from which value on it reads well.
+# SI unit -> units that are shown, the largest first, each with its value in SI and the least value for which it is used.
 UNITS: dict[str, list[tuple[str, float, float]]] = {
     "kg*m^2": [("kg·m²", 1.0, 0.05), ("kg·cm²", 1e-4, 0.0)],
     "N*m": [("N·m", 1.0, 0.5), ("mN·m", 1e-3, 0.0)],
@@ -76,7 +76,7 @@ UNITS: dict[str, list[tuple[str, float, float]]] = {
 
 
 def unit_of(si_unit: str, value: float) -> tuple[str, float]:
-    """(unit, what one of it is in SI) in which such a value reads well."""
+    """(unit, its value in SI) in which such a value reads well."""
     return next((unit, factor) for unit, factor, low in UNITS[si_unit] if value >= low)
 
 
@@ -92,7 +92,7 @@ def from_zero(value: float, usual: float = 0.0) -> Range:
 
 LEAST_SHARE = 0.3  # of what ends at a largest value that a file may have, such as an efficiency
 
-# End of a key -> label, and how many ways around the value its slider goes; None: from 0 on. Unit and largest value are those of the key.
+# End of a key -> label, and how many ways around the value its slider goes; None: from 0 on. Unit and largest value follow from the key.
 LABELS: dict[str, tuple[str, float | None]] = {
     "rotor_inertia": ("rotor inertia", 10.0),
     "electrical_time_constant": ("electrical time constant", 10.0),
@@ -147,7 +147,7 @@ def of_parameters(
     values: keys of the scenario file, and the values.
     usual: of keys that are 0: to where the slider goes.
     views: of keys that are drawn: where they stand.
-    units, limits: SI units of the keys, which are those of forces where a motor moves a slide, and what a file may have.
+    units, limits: SI units of the keys (units of forces where a motor moves a slide), and their values in the file.
     """
     for key, value in values:
         table, *names = key.split(".")
@@ -238,7 +238,7 @@ def duration(value: float, sample_interval: float) -> Slider:
 
 
 def told_apart(found: list[Slider]) -> list[Slider]:
-    """The sliders, those of equal labels in one group with the kind of their elements."""
+    """The sliders. Sliders with equal labels form one group, named by the kind of their elements."""
     labels = Counter((s.group, s.label) for s in found)
 
     def kind(slider: Slider) -> str:

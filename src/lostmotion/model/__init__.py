@@ -1,4 +1,4 @@
-"""The parts of a drive, the signals that act on it and what is asked of it."""
+"""The parts of a drive, the signals that act on it, and its task."""
 
 from ..namespace import namespace
 

@@ -10,7 +10,7 @@ from .shaft import WithDrag
 
 
 class Damper(WithDrag, DamperFields, BetweenShafts):
-    """A torque over the slip, the speed of the input less that of the output: it drives the output and brakes the
+    """A torque over the slip, which is the speed of the input minus the speed of the output: it drives the output and brakes the
     input.
 
     Examples

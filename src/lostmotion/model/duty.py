@@ -150,7 +150,7 @@ class Duty(Part):
 
     @property
     def anything(self) -> bool:
-        """Whether there is any of it."""
+        """Whether there is any wind."""
         return self.gravity is not None or bool(self.payload or self.process)
 
 

@@ -61,5 +61,5 @@ class EndStops(core_parameters.EndStopsFields):
         return self
 
     def of_shaft(self) -> ShaftEndStops:
-        """The same as those of a shaft of the equations, in units of translation."""
+        """The same as end stops of a shaft in the equations, in units of translation."""
         return ShaftEndStops.like(self)

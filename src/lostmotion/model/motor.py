@@ -64,7 +64,7 @@ class MotorLimits(MotorHeat):
     max_current: Annotated[Current, Positive] | None = None
     """smaller limit of motor and amplifier, in the amperes of torque_constant"""
     max_inertia_ratio: Annotated[Number, Positive] | None = None
-    """largest inertia of the load, gearbox included, at the motor relative to that of the rotor"""
+    """largest inertia of the load, gearbox included, at the motor relative to the rotor's inertia"""
 
     @model_validator(mode="after")
     def _one_resistance(self) -> Self:
@@ -147,7 +147,8 @@ class Motor(MotorFields):
     """dc voltage of the amplifier that feeds a synchronous motor"""
     kind: Literal["dc", "torque_source", "synchronous", "stepper"] = "dc"
     """`torque_source`: the command times `rated_torque` acts on the rotor without delay; `synchronous`: command 1 is the largest
-    voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase; `stepper`: hybrid stepper, whose command is the angle
+    voltage that the amplifier can give, dc_voltage/sqrt(3), amplitude of a phase; `stepper`: hybrid stepper, whose command is
+    the angle
     of its field"""
     winding: Winding | None = None
     """winding of a synchronous motor, or of one that is modelled as a torque source, for its current and its heat"""

@@ -1,6 +1,6 @@
 """Behaviour of a gear while its load drives it, before any run: it locks, lowers smoothly, chatters or jams.
 
-docs/self-locking.md derives it. The laws are those of the solver: losses and linear regimes come from the core.
+docs/self-locking.md derives it. The laws are the laws of the solver: losses and linear regimes come from the core.
 """
 
 from __future__ import annotations

@@ -46,7 +46,7 @@ class Forms(NamedTuple):
     question: str
     unit: str
     common: str  # form to which all others are converted
-    factors: dict[str, float]  # key of a form: the common value to one of it
+    factors: dict[str, float]  # key of a form: the common value in SI
 
 
 PHASE_OR_LINES = "between two terminals or of one phase"
@@ -149,8 +149,8 @@ class PhaseValues:
         return self.inductance_q / self.resistance, voltage / (self.resistance * current), rated_speed
 
     def voltage(self, u_q: Any, torque: Any, speed: Any) -> Any:
-        """Amplitude of the voltage of a phase [V], with that of the decoupling, u_d = -w_e L_q i_q, for u_q [V], torque [N·m]
-        and speed [rad/s]."""
+        """Amplitude of the voltage of a phase [V], with the decoupling voltage u_d = -w_e L_q i_q, for u_q [V],
+        torque [N·m] and speed [rad/s]."""
         u_d = self.pole_pairs * speed * self.inductance_q * torque / self.torque_constant
         return np.sqrt(u_q * u_q + u_d * u_d)
 
@@ -158,7 +158,7 @@ class PhaseValues:
 class Winding(Part):
     """Winding and magnets of a synchronous motor as data sheets print them: each value in one of its forms.
 
-    Values are those of the star connection; that of a delta connection between two terminals is the same. Of several constants
+    Values refer to the star connection; the value of a delta connection between two terminals is the same. Of several constants
     that say the same (flux linkage, voltage and torque constant) the first given in this order is taken.
     """
 

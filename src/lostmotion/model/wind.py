@@ -29,8 +29,9 @@ KARMAN = 0.4
 class Wind(Part):
     """Random torque of a given one-sided spectrum S, made of sines: ``sum of sqrt(2 S(f_k)/D) cos(2 pi f_k t + phase_k)``, f_k = k/D.
 
-    The phases are uniform, from the seed (Shinozuka and Deodatis 1991). It repeats after the duration D; its variance is that of the lines of
-    the spectrum up to ``max_frequency``, in every realisation. Between its points, ``1/(points_per_period max_frequency)`` apart, it is straight.
+    The phases are uniform, from the seed (Shinozuka and Deodatis 1991). It repeats after the duration D; the variance
+    equals the variance of the spectrum's lines up to ``max_frequency``, in every realisation. Between its points,
+    ``1/(points_per_period max_frequency)`` apart, it is straight.
     """
 
     duration: Annotated[Time, Positive]  #: D, after which it is constant; its lowest frequency is 1/D
@@ -65,7 +66,7 @@ class Wind(Part):
         """Instants [s] from 0 to the duration, and the torque there [N·m]."""
         f = self.lines()
         n = f.size * self.points_per_period
-        # Raw bits of a counter-based generator, whose order is that of the frequencies: a longer spectrum keeps the phases.
+        # Raw bits of a counter-based generator, in the order of the frequencies: a longer spectrum keeps the phases.
         phase = 2.0 * math.pi * (np.random.Philox(key=self.seed).random_raw(f.size) >> np.uint64(11)) * 2.0**-53
         amplitude = np.sqrt(2.0 * self.spectrum(f) / self.duration)
         real, imaginary = np.zeros((2, n))

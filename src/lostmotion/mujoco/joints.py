@@ -82,7 +82,7 @@ def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:
 
 
 def actuator_name(model: mujoco.MjModel, k: int) -> str:
-    """An actuator as messages name it: by its name, or by its place among those of the model."""
+    """An actuator as messages name it: by its name, or by its place among the joints of the model."""
     name = model.actuator(k).name
     return f"actuator {name!r}" if name else f"actuator without a name (number {k + 1} of {model.nactuator})"
 

@@ -92,8 +92,7 @@ def reduce(
     InputError
         The drive does not follow the motion, its gears swing too slowly for it, or a scenario has a load torque or a weight and
         `load_torque` is left out.
-    SolverError
-        The motion has no continuation, such as that of a worm that locks.
+    The motion has no continuation, as where a worm locks.
 
     Examples
     --------

@@ -38,7 +38,7 @@ def paper_scenario(model: str, amplitude: str) -> Scenario:
 
 @dataclass(frozen=True)
 class Constant:
-    """One printed constant beside two computations of it."""
+    """One printed constant beside two values that are computed for it."""
 
     name: str
     unit: str

@@ -26,7 +26,9 @@ class Facts:
     worst_balance: float  # largest residual of the energy balance / energy turned over
     stuck: dict[tuple[str, str], float]  # share of the time with the motor's shaft stuck
     load_rests: dict[tuple[str, str], float]  # share of the time after its first motion with the load at rest
-    torque_gap: float  # largest distance of a linear model's motor torque from that of 2-DOF-NL / peak, large amplitude
+    torque_gap: (
+        float  # largest distance of a linear model's motor torque from the torque of 2-DOF-NL / peak, large amplitude
+    )
     best_efficiency: dict[str, float]  # of 2-DOF-NL, as the next three
     mean_efficiency: dict[str, float]  # over the time in which it is defined
     energy_efficiency: dict[str, float]  # energy out / energy in, each counted where its power is positive

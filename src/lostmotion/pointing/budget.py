@@ -42,8 +42,8 @@ class PointingError:
     probable: float
     """0.6745 standard deviations"""
     measured_rms: float
-    """rms of the measured direction: with a camera, target minus expected target of its tracker; else the angle of the load minus that of the
-    encoder, or of a stepper minus the one that its driver counts"""
+    """rms of the measured direction: with a camera, target minus expected target of its tracker; else the angle of
+    the load minus the angle of the encoder, or of a stepper minus the angle that its driver counts"""
 
 
 @dataclass(frozen=True)
@@ -128,8 +128,8 @@ def pointing_budget(
     alone, and with one cause after another removed. Further motions have other controllers, temperatures, wear and
     target speeds. Causes are backlash, the zone of low stiffness, hysteresis, dry friction, gear losses, encoder
     steps, delay, wind, and latency, noise and pixels of cameras. A controller with an inverse model knows the drive
-    of each run, except its temperature. An axis of a stepper has no loop. Its causes are also microsteps, the sine table of its driver,
-    detents and transmission errors, and `orders` has its error at constant speed.
+    of each run, except its temperature. An axis of a stepper has no loop. Its causes are also microsteps, the sine table of
+    its driver, detents and transmission errors, and `orders` has its error at constant speed.
 
     Parameters
     ----------

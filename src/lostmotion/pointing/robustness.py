@@ -15,7 +15,7 @@ COPPER, MAGNETS, LUBRICANT = (
 )  # [1/K], relative: resistance, flux of ferrite, friction and losses
 
 MAP_FACTORS = (0.6, 0.8, 1.25, 1.5)
-TEMPERATURES = (-40.0, -20.0, 20.0, 40.0)  # [K], from that of the data
+TEMPERATURES = (-40.0, -20.0, 20.0, 40.0)  # [K], from the temperature of the data
 WEAR = (0.5, 1.0, 2.0, 5.0)  # [arcmin]
 AXIAL_WEAR = (1.0, 2.0, 5.0, 10.0)  # [µm]
 SPEED_FACTORS = (0.25, 0.5, 1.5, 2.0)
@@ -36,7 +36,7 @@ def scaled_losses(factor: float) -> TableChange:
 
 
 def warmer(difference: float) -> TableChange:
-    """Dry and viscous friction and losses of gears by exp(-0.015 difference), windings of DC motors and their magnets; the controllers do not know of it."""
+    """Dry and viscous friction and losses of gears by exp(-0.015 difference), windings of DC motors and their magnets; the controllers do not know of the change."""
     lubricant = math.exp(LUBRICANT * difference)
 
     def change(data: Tables) -> None:

@@ -67,7 +67,7 @@ class Derivation:
 def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str], bool] | None = None) -> Derivation:
     """The values of a scenario that can be changed in its numbers, and what follows from them.
 
-    numbers: gives those of a scenario.
+    numbers: gives the derivation of a scenario.
     without: whether a key is to be left out.
     """
     values = {
@@ -91,7 +91,7 @@ def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str],
 
 
 def values_of(node: Any, key: str = "") -> Iterator[tuple[str, float]]:
-    """Dotted keys and values of all numbers with a fraction, those of lists of numbers left out."""
+    """Dotted keys and values of all numbers with a fraction; lists of numbers are left out."""
     for name, inner in _entries(node):
         if key or name not in _OTHERS:
             yield from values_of(inner, f"{key}.{name}" if key else name)
@@ -126,7 +126,7 @@ class _Recording:
         self._tape, self._keys = Tape(), list[str]()
 
     def recordable(self, keys: Sequence[str], beside: Sequence[str] = ()) -> list[str]:
-        """Keys, with those beside them, of which all that follows is recorded; where not all fit together, the first."""
+        """Keys, with the keys beside them; all values that follow from them are recorded; where not all fit together, the first."""
         if not keys or self.of([*beside, *keys]) is not None:
             return [*beside, *keys]
         if len(keys) == 1:
@@ -155,7 +155,7 @@ class _Recording:
         return places
 
     def derivation(self, places: Mapping[int, int]) -> Derivation:
-        """The formulas that the places need; parameters of which none follows are constants of them."""
+        """The formulas that the places need; parameters from which nothing follows are constants."""
         formulas, conditions = self._tape.formulas, self._tape.conditions
         of_places = self._used(places.values())
         given = sorted(one for law, one, *_ in (formulas[k] for k in of_places) if law == "parameter")

@@ -57,7 +57,7 @@ def described(scenario: Scenario) -> tuple[np.ndarray, list[tuple[str, float]]]:
 
 
 def written(scenario: Scenario, derivation: Derivation, case: _core.Case | None = None) -> np.ndarray:
-    """The description with these parameters, or that of another case with the controllers of the scenario."""
+    """The description with these parameters, or the description of another case with the controllers of the scenario."""
     return np.array(
         _core.write_description(
             numbers_of(scenario, case).tolist(), [p.core() for p in derivation.parameters], derivation.core()

@@ -222,7 +222,7 @@ def _check_references(scenario: Scenario) -> None:
 
 
 def _of_signals(scenario: Scenario, key: str, references: bool) -> bool:
-    """Whether a key is that of a signal, which in an FMU the importer gives."""
+    """Whether a key belongs to a signal, which in an FMU the importer gives."""
     parts = key.split(".")
     # Of the command of a brake or a clutch: what the importer gives acts at once.
     delay = parts[0] in ("brakes", "clutches") and parts[-1] in ("engagement_delay", "release_delay")
@@ -334,7 +334,7 @@ def _fine(state: Declared) -> Declared:
 
 
 def _start_of(scenario: Scenario, state: str) -> float:
-    """A state at t = 0; those of controllers begin at 0."""
+    """A state at t = 0; times of controllers begin at 0."""
     return float(scenario.start().get(state, 0.0))
 
 

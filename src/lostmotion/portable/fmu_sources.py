@@ -65,7 +65,7 @@ def _override(fmi: int) -> str:
 
 
 def _configuration(fmi: int, identifier: str, names: list[str]) -> str:
-    """The header that makes the sources those of one FMU."""
+    """The header that makes the sources the sources of one FMU."""
     functions = [name for name in names if name.startswith(f"fmi{fmi}")]
     others = [name for name in names if not name.startswith("fmi")]
     lines = [

@@ -201,7 +201,7 @@ def _chosen_logs(result: IdentificationResult) -> dict[str, str]:
 
 
 def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Group]:
-    """All charts, those of some logs first.
+    """All charts; charts of some logs come first.
 
     chosen: names of the logs that are drawn, with their rank; empty: all.
     """

@@ -28,7 +28,7 @@ SCREEN = 34  # records that fit on a screen with the lines around them
 
 
 def _range(text: str | None, option: str, unit: str = "") -> tuple[float, float]:
-    """Bounds from ``MIN..MAX``, of which each may be left out, or from ``MIN-MAX``."""
+    """Bounds from ``MIN..MAX``, where either may be left out, or from ``MIN-MAX``."""
     if text is None:
         return -np.inf, np.inf
     if (dash := re.fullmatch(r"(.*[^eE\s])\s*[-–]\s*([\d.].*)", text)) and ".." not in text:

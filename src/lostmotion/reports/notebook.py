@@ -6,7 +6,7 @@ from importlib import import_module
 from types import ModuleType
 from typing import Any
 
-# Module -> its class, the module here that makes a page of it, and the function that does.
+# Module -> its class, and the module and function here that make the page.
 PAGES = {
     "identification.identify": ("IdentificationResult", "identification", "identification_report"),
     "identification.monitor.monitor": ("MonitorResult", "monitor", "monitor_report"),

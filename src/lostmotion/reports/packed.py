@@ -72,7 +72,7 @@ def _described(chart: Chart, pack: Packed) -> dict[str, Any]:
         return {"kind": "contacts", "rows": rows, "duration": float(chart.time[-1] - chart.time[0])}
     if isinstance(chart, Flows):
         return {"kind": "flows", "energies": dict(chart.energies)}
-    return {"kind": "still"}  # all of it is in the document
+    return {"kind": "still"}  # the document contains the whole file
 
 
 def _panel(panel: Panel, pack: Packed) -> dict[str, Any]:

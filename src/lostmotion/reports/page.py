@@ -169,7 +169,7 @@ def _group(group: Group, charts: list[Chart]) -> str:
 
 
 def cards(shown: Sequence[Chart], charts: list[Chart], columns: int = 2) -> str:
-    """Figures beside each other; their charts are added to those of the page."""
+    """Figures beside each other; their charts are added to the charts of the page."""
     kind = {1: "charts one", 3: "charts three"}.get(columns, "charts")
     return (
         f'<div class="{kind}">{chr(10).join(_card(chart, charts, still=len(charts) < STILL) for chart in shown)}</div>'

@@ -1,4 +1,4 @@
-"""Content of a figure before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws pictures of it."""
+"""Content of a figure before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws them as pictures."""
 
 from __future__ import annotations
 

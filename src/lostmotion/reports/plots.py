@@ -71,7 +71,7 @@ def draw(charts: Iterable[Chart], columns: int, size: tuple[float, float], note:
 
 
 def _legends(figure: Figure, every: list[Any]) -> None:
-    """One legend above the figure where the curves of all panels are among those of one; else one in each panel."""
+    """One legend above the figure where one panel has the curves of all panels; else one in each panel."""
     entries = [_some(dict(zip(*axes.get_legend_handles_labels()[::-1], strict=True))) for axes in every]
     longest = max(entries, key=len)
     if len(every) > 1 and len(longest) > 1 and all(labels.keys() <= longest.keys() for labels in entries):
@@ -228,7 +228,7 @@ def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tupl
 def overview(result: xarray.Dataset, figure: str | None = None) -> Figure:
     """A run at a glance: controlled axes with their following errors, commands, speeds, torques, twists, contacts as bars.
 
-    figure: a part of it alone: motion, losses, contacts or energy.
+    figure: a single panel: motion, losses, contacts or energy.
 
     Raises InputError: the dataset lacks what is shown.
     """

@@ -85,7 +85,7 @@ def _dotted(k: int) -> dict[str, Any]:
 
 def _unit(budget: PointingBudget, axis: str | None = None) -> tuple[float, str]:
     """In which errors are shown: how many of one rad or m, and the unit of an axis, or of all."""
-    if budget.orders and set(_units(budget, axis)) == {"rad"}:  # axes of steppers are those of mounts
+    if budget.orders and set(_units(budget, axis)) == {"rad"}:  # axes of steppers belong to mounts
         return ARCSEC, "arcsec"
     factor, prefix = (1e6, "µ") if max(e.peak for e in budget.whole.values()) < 5e-5 else (1e3, "m")
     return factor, " or ".join(f"{prefix}{unit}" for unit in _units(budget, axis))
@@ -224,7 +224,7 @@ def order_rows(budget: PointingBudget) -> list[list[str]]:
 
 
 def _verdict(budget: PointingBudget) -> Verdict | tuple[str, ...]:
-    """Verdict on limits and view; the error of each axis, and what causes most of it."""
+    """Verdict on limits and view; the error of each axis, and its largest cause."""
     errors, causes = [], []
     for axis, e in budget.whole.items():
         factor, unit = _unit(budget, axis)

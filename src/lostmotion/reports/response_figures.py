@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 def bode_figure(responses: Mapping[str, xarray.Dataset], output: str) -> Figure:
-    """Gain over phase; the panels are those of `bode`."""
+    """Gain over phase; the panels are the panels of `bode`."""
     return plots.draw(bode(responses, output), 1, (9.0, 7.5))
 
 

@@ -178,7 +178,7 @@ def percent(share: float) -> str:
 
 
 def comparison_table(comparisons: Sequence[Comparison]) -> list[Table | Group | Prose]:
-    """The data of the sheet beside those of the rig; nothing where there are none."""
+    """The data of the sheet beside the measurements of the rig; nothing where there are none."""
     if not comparisons:
         return []
     rows = [

@@ -165,7 +165,7 @@ def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
 
 
 def _most(rows: list[tuple[float, str]]) -> tuple[list[str], list[float]]:
-    """Texts in their order, of too many those of the largest values; and the values of the others."""
+    """Texts in their order; of too many, the texts with the largest values; and the values of the others."""
     least = sorted(rows)[: -SHOWN if len(rows) > MANY else 0]
     return [text for value, text in rows if (value, text) not in least], [value for value, _ in least]
 

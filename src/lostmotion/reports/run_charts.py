@@ -89,7 +89,7 @@ def _panel(result: xarray.Dataset, title: str, label: str, series: list[Series])
     curves = tuple(
         Curve(text, time, factor * result[name].values, look(k)) for k, (name, text, factor) in enumerate(series)
     )
-    if len(curves) == 1 and title.endswith("s"):  # of several elements, of which there is one, and so no legend
+    if len(curves) == 1 and title.endswith("s"):  # of several elements; a single one needs no legend
         title = f"{title}: {curves[0].label}"
     return Panel(title, "time [s]", label, curves)
 
@@ -147,7 +147,7 @@ LINEAR_WORDS = {"torque": "force", "twist": "deflection"}
 def _by_domain(
     train: DriveTrain, title: str, label: str, what: str, variables: list[tuple[str, str, str]]
 ) -> Iterator[tuple[str, str, list[Series]]]:
-    """One panel for the variables of shafts and one for those of slides: (name, legend, shaft) of each."""
+    """One panel for the variables of shafts and one for the variables of slides: (name, legend, shaft) of each."""
     for slides in (False, True):
         chosen = [(name, text, shaft) for name, text, shaft in variables if train.is_slide(shaft) == slides]
         if not chosen:
@@ -160,7 +160,7 @@ def _by_domain(
 
 
 def _between_stops(result: xarray.Dataset, train: DriveTrain, name: str) -> Panel:
-    """Position of a slide, or angle of a shaft, with those of its end stops that it comes near."""
+    """Position of a slide, or angle of a shaft, with the end stops that it comes near."""
     unit, factor = charted(train.angle_unit(name))
     time, values = result["time"].values, factor * result[train.variable(name, "angle")].values
     low, high = float(values.min()), float(values.max())

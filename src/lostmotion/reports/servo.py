@@ -84,7 +84,7 @@ def _step_text(step: StepResponse) -> str:
 
 
 def _cycle_table(report: ServoReport, cycle: LimitCycle) -> Table:
-    """The limit cycle, and what is left of it without each possible cause."""
+    """The limit cycle, and its remainder without each possible cause."""
     motor, load = (charted(unit, small=True) for unit in (report.motor_unit, report.load_unit))
     rows = []
     for what, rest in {"nothing": cycle.whole, **cycle.without}.items():

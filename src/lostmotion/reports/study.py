@@ -286,7 +286,7 @@ def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> 
 
     Returns the path of the page.
 
-    Raises InputError: the target is the directory of the study, all files of which readers of Parquet try to read.
+    Raises InputError: the target is the directory of the study, where readers of Parquet try to read every file.
     """
     need("scipy", "The page of a study", "study")
     if target.resolve().is_relative_to(directory.resolve()):

@@ -1,8 +1,8 @@
 """Periodic motions of closed loops under a sine, by shooting with the state of the controllers in the map.
 
-The map leads over whole periods that take a whole number of sample times, from the middle of a tick to that of
-another. Its state is that of the drive and all that the controllers remember. A quantised encoder makes it constant
-by pieces, so that no derivative of it means anything; neither does the state of a controller at its limits. Therefore
+The map leads over whole periods that take a whole number of sample times, from the middle of one tick to the middle
+of another. The state is the state of the drive and all values that the controllers remember. A quantised encoder
+makes it constant by pieces, so that its derivatives mean nothing; neither does the state of a controller at its limits. Therefore
 the limit of the sequence of states is extrapolated by the method of reduced rank. The method is exact in d + 1 steps
 if the map is affine on d dimensions, and converges as Newton's method does if it is smooth. Its limit is taken only
 if the motion from there repeats better.
@@ -231,7 +231,7 @@ class Search:
             loop.simulation.state, loop.begin = kept, begin
 
     def _averaged(self) -> Motion | str:
-        """Means over ever more windows, the first half of which is left out, until two quarters agree."""
+        """Means over ever more windows, without the first half, until two quarters agree."""
         loop, w = self.loop, self.loop.window
         plants: list[np.ndarray] = []
         slots: list[np.ndarray] = []

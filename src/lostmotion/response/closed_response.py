@@ -107,7 +107,7 @@ def respond_closed(
 def _row(
     plant: Plant, source: tuple[str, float], window: Window, motion: Motion | str, harmonics: int
 ) -> dict[str, Any]:
-    """The values of one point, by the names that those of the core have."""
+    """The values of one point, by the names of the core's values."""
     count = len(plant.channels)
     row: dict[str, Any] = {"error": "", "converged": True, "residual": math.nan, "periods": 0, "newton_steps": 0}
     row |= {"harmonics": np.full((count, harmonics + 1, 2), math.nan), "mean_square": np.full(count, math.nan)}

@@ -34,7 +34,7 @@ def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: s
     drive : Drive or Scenario
         The drive, or its scenario.
     output : str, optional
-        The result variable. Default: the load's speed, in a train that of its last shaft.
+        The result variable. Default: the load's speed, in a train the speed of the last shaft.
 
     Returns
     -------
@@ -117,7 +117,7 @@ def bandwidth(
     amplitude : float
         Amplitude of the command, E_CA [-], or of another input.
     output : str, optional
-        The result variable. Default: the load's speed, in a train that of its last shaft.
+        The result variable. Default: the load's speed, in a train the speed of the last shaft.
     source : str, optional
         The input, as in `frequency_response`. Default: the command of the only motor.
     mean_command, mean_load_torque : float, optional

@@ -50,10 +50,10 @@ def frequency_response(
     Each point is a periodic motion, found by shooting. Points are independent of each other; the result is the same for any number
     of threads.
 
-    In a scenario with controllers the sine is that of a reference or a load torque. Its period must fit the sample times: if ten
+    In a scenario with controllers the sine belongs to a reference or a load torque. Its period must fit the sample times: if ten
     periods do not, the nearest frequency that fits is taken. Encoders with steps may keep the motion from repeating. Then the
-    harmonics are means over many periods, and ``spread`` states how far they vary. Variables of controllers are taken at their
-    samples, those of the drive between two sample instants, at least 256 times a period.
+    harmonics are means over many periods, and ``spread`` states how far they vary. Variables of controllers are taken
+    at their samples. Variables of the drive are taken between two sample instants, at least 256 times a period.
 
     Parameters
     ----------
@@ -65,8 +65,8 @@ def frequency_response(
         Amplitudes of the input: E_CA [-], load torque [N·m], or a reference in its unit (rad, rad/s, N·m).
     source : str, optional
         The input that is a sine: ``"command"``, with a controller ``"reference"``, or ``"load_torque"``; in a train
-        ``"<motor>_command"``, ``"<motor>_reference"``, ``"<shaft>_load_torque"`` and so on. The others are constant. Default: command or
-        reference of the only motor.
+        ``"<motor>_command"``, ``"<motor>_reference"``, ``"<shaft>_load_torque"`` and so on. The others are constant. Default:
+        command or reference of the only motor.
     mean_command, mean_load_torque : float, optional
         Constant parts of E_C [-] and M_Z [N·m] of a drive. Default: the values in the scenario, or 0.
     harmonics : int
@@ -87,14 +87,15 @@ def frequency_response(
     Returns
     -------
     xarray.Dataset
-        Over ``amplitude`` and ``frequency`` [Hz], with ``output`` and ``harmonic``: complex ``response`` (first harmonic of each output
-        divided by that of the input), ``harmonics`` (complex amplitudes, 0 is the mean), ``distortion`` (rms of all above the first,
-        divided by the first), ``efficiency`` (mean power out of the last gears divided by mean power of the motors), ``motor_power``,
-        ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load or last shaft in a period, ``residual`` of periodicity,
-        ``periods``, ``newton_steps``, ``multiplier`` (largest Floquet multiplier), ``stable``, and ``reason`` (empty if a motion was
-        found; otherwise the values are NaN). With controllers, ``output`` is by default the measured value of the outermost loop,
-        ``newton_steps`` are extrapolations, and ``multiplier`` is NaN, since the map has no derivative. ``spread`` is the variation of
-        the first harmonic of ``output`` divided by its mean, 0 if the motion repeats; ``asked_frequency`` [Hz] is the requested one.
+        Over ``amplitude`` and ``frequency`` [Hz], with ``output`` and ``harmonic``: complex ``response`` (first harmonic of
+        each output divided by that of the input), ``harmonics`` (complex amplitudes, 0 is the mean), ``distortion`` (rms of
+        all above the first, divided by the first), ``efficiency`` (mean power out of the last gears divided by mean power of
+        the motors), ``motor_power``, ``load_power``, ``gear_loss`` [W], ``angle_advance`` [rad] of the load or last shaft in
+        a period, ``residual`` of periodicity, ``periods``, ``newton_steps``, ``multiplier`` (largest Floquet multiplier),
+        ``stable``, and ``reason`` (empty if a motion was found; otherwise the values are NaN). With controllers, ``output``
+        is by default the measured value of the outermost loop, ``newton_steps`` are extrapolations, and ``multiplier`` is
+        NaN, since the map has no derivative. ``spread`` is the variation of the first harmonic of ``output`` divided by its
+        mean, 0 if the motion repeats; ``asked_frequency`` [Hz] is the requested one.
 
     Raises
     ------
@@ -272,7 +273,7 @@ def _labelled(
 
 
 def _harmonics(r: dict[str, Any], found: np.ndarray, source: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Complex amplitudes of all outputs, the first of them / that of the source, and the distortion."""
+    """Complex amplitudes of all outputs, the first harmonic over the source's, and the distortion."""
     c = r["harmonics"][..., 0] + 1j * r["harmonics"][..., 1]
     c = c.reshape(*found.shape, *c.shape[1:])
     c = np.where(found[..., None, None], c, np.nan)
@@ -324,7 +325,7 @@ def to_control(response: xarray.Dataset, amplitude: Number, output: str | None =
     amplitude : float
         One of its amplitudes.
     output : str, optional
-        The result variable. Default: the load's speed, in a train that of its last shaft.
+        The result variable. Default: the load's speed, in a train the speed of the last shaft.
 
     Returns
     -------

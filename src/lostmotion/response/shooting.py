@@ -131,10 +131,10 @@ def periodic_motion(
     Returns
     -------
     xarray.Dataset
-        The result variables over one period, and the ``jacobian`` of the map. Attributes: ``residual`` (largest change of a state over
-        the period divided by its largest magnitude), ``angle_advance`` of the load or last shaft [rad], ``multipliers_real`` and
-        ``multipliers_imag`` (Floquet), ``stable``, ``smooth`` (true if the multipliers are exact: no switching grazes), ``periods``
-        followed, ``newton_steps``, ``start_<component>``, ``period`` [s] and ``scenario``.
+        The result variables over one period, and the ``jacobian`` of the map. Attributes: ``residual`` (largest change of a
+        state over the period divided by its largest magnitude), ``angle_advance`` of the load or last shaft [rad],
+        ``multipliers_real`` and ``multipliers_imag`` (Floquet), ``stable``, ``smooth`` (true if the multipliers are exact: no
+        switching grazes), ``periods`` followed, ``newton_steps``, ``start_<component>``, ``period`` [s] and ``scenario``.
 
     Raises
     ------
@@ -267,7 +267,7 @@ def periodic_motions(
 
 
 def _same(floors: Mapping[str, float], a: xarray.Dataset, b: xarray.Dataset) -> bool:
-    """Whether two motions are one; that of the longer period is compared at each shift by the shorter one.
+    """Whether two motions are one; the state of the longer period is compared at each shift by the shorter one.
 
     floors: rated magnitudes: what is smaller than `SAME` of them is no difference between motions.
     """

@@ -118,8 +118,8 @@ def spectrum(
     scenario
         At constant speed from `start` to its end.
     against
-        ``"reference"``: reference of a position loop less the position of its shaft; ``"motor"``: angle of the motor over the ratio, less
-        the angle of the shaft, the transmission error. Left out, the reference where the axis follows a position.
+        ``"reference"``: reference of a position loop less the position of its shaft; ``"motor"``: angle of the motor over the
+        ratio, less the angle of the shaft, the transmission error. Left out, the reference where the axis follows a position.
     motor
         May be left out where there is one.
     start
@@ -199,7 +199,7 @@ def spectrum(
         assert followed is not None
         value, slope = followed[0].at(time)[:2]
         error, error_rate = value - place, slope - rate
-    if smooth is not None:  # a rotor swings in its field: angles are those of its reference
+    if smooth is not None:  # a rotor swings in its field: angles belong to its reference
         angle, speed = (ratio * x for x in smooth.at(time)[:2])
     per_turn = {n: 1.0 / r for n in train.shafts if not train.is_slide(n) and (r := turns(train, over, n)) is not None}
     direction = math.copysign(1.0, window[1])
@@ -276,7 +276,7 @@ def _window(
 ) -> tuple[float, float]:
     """Begin of the evaluated part [s], and the speed of the motor in it [rad/s]; refused where that is not constant.
 
-    smooth: reference of a stepper, whose speed counts in place of that of the rotor.
+    smooth: reference of a stepper, whose speed replaces the rotor's speed.
     """
     duration = long.simulation.duration
     begin = 0.5 * duration if start is None else start
@@ -453,7 +453,7 @@ def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str
 
 
 def _order(law: Any) -> tuple[float, bool]:
-    """Periods per turn, and whether there are multiples of it."""
+    """Periods per turn, and whether there are multiples."""
     if isinstance(law, Harmonic):
         return float(law.order), False
     assert isinstance(law, AngleCurve | PositionHarmonic)

@@ -53,7 +53,7 @@ class StepResponse:
 
     @property
     def overshoot(self) -> float:
-        """By which it exceeds the step, as a share of it."""
+        """Overshoot, as a share of the step."""
         return max(float((self.value / self.size).max()) - 1.0, 0.0)
 
     @property
@@ -205,8 +205,8 @@ class Following:
     peak: float
     rms: float
     unseen: np.ndarray
-    """part of the error of a position that its encoder does not see: the angle of the encoder's shaft, in terms of the reference's
-    shaft, less that of the reference's shaft [rad]"""
+    """part of the error of a position that its encoder does not see: the angle of the encoder's shaft, in terms of
+    the reference's shaft, minus the angle of the reference's shaft [rad]"""
     encoder: str
     """shaft of that encoder"""
     limits: Mapping[str, float]
@@ -231,7 +231,7 @@ def following(axis: Axis) -> Following:
 
 
 def errors_of(axis: Axis, data: RunArrays) -> tuple[np.ndarray, np.ndarray]:
-    """Error of a position over a run, and the part of it that its encoder does not see [rad]."""
+    """Error of a position over a run, and the part that its encoder does not measure [rad]."""
     train, encoder, name = axis.train, axis.position_encoder[0], axis.measured["position"][0]
     error = axis.controller.reference.at(data["time"])[0] - data[name]
     if encoder == axis.shaft:

@@ -165,7 +165,7 @@ class ServoReport:
         return "does not fit", f"{text}: {self._why(worst)}" if worst.last and self._swings(worst) else text
 
     def _rest_points(self) -> Iterator[Point]:
-        """Hunting, and what is not known of it."""
+        """Hunting, and what is not known about it."""
         whole = None if self.limit_cycle is None else self.limit_cycle.whole
         if whole is not None and whole.cycles:
             judged = self.settling and self.settling[-1].within
@@ -338,14 +338,15 @@ def commission(
 ) -> ServoReport:
     """Compute margins, steps, following error, settling, stiffness and limit cycles of an axis.
 
-    Margins, bandwidths and stiffness are those of the exact linear sampled loop in each regime of the plant (segment of the torsion
-    curve, twist or load stuck). The plant is propagated by the matrix exponential over a base period, with sample times and delays
-    as they are. A loop with several sample times is a time-invariant system over that of its outermost loop. Field-oriented control
-    is linear about the steady motion of the regime. A loop is cut at the measured value of its controller; the loops within it are
-    closed, those around it open. Limits, quantisation and dead zones count in the runs only: steps, following, settling and rest are
-    exact simulations of the scenario. Moves are repeated, both ways, until they repeat. An axis has settled after a move if its error
-    stays within the window until the next move begins. After the last one only rest proves that it stays there for ever; a steady
-    swing within the window is reported as settled, not proved.
+    Margins, bandwidths and stiffness belong to the exact linear sampled loop in each regime of the plant (segment of
+    the torsion curve, twist or load stuck). The plant is propagated by the matrix exponential over a base period, with sample
+    times and delays as they are. A loop with several sample times is a time-invariant system over the sample time of its
+    outermost loop. Field-oriented control is linear about the steady motion of the regime. A loop is cut at the measured
+    value of its controller; the loops within it are closed, those around it open. Limits, quantisation and dead zones count
+    in the runs only: steps, following, settling and rest are exact simulations of the scenario. Moves are repeated, both
+    ways, until they repeat. An axis has settled after a move if its error stays within the window until the next move begins.
+    After the last one only rest proves that it stays there for ever; a steady swing within the window is reported as settled,
+    not proved.
 
     Parameters
     ----------
@@ -354,8 +355,8 @@ def commission(
     motor : str, optional
         Name of the motor whose controller is examined. Default: the only one.
     window : float, optional
-        Window of the settled position [rad], of a slide [m], or text such as "1 arcmin", "5 um". Default: four steps of the position's encoder at the reference's shaft,
-        at least a thousandth of the longest move.
+        Window of the settled position [rad], of a slide [m], or text such as "1 arcmin", "5 um". Default: four steps of the
+        position's encoder at the reference's shaft, at least a thousandth of the longest move.
     progress : callable
         Called `work(scenario)` times.
 
@@ -474,7 +475,7 @@ def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
 
 
 TRUE = "reference less true value"
-SWINGS = 0.25  # of the error that is left: the least amplitude of which it is said that it swings
+SWINGS = 0.25  # of the error that is left: least amplitude that is reported as a swing
 
 
 def decibels(factor: float) -> float:

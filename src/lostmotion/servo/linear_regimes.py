@@ -276,7 +276,7 @@ def _last_slope(stiffness: Elastic) -> float:
 
 
 def _last(gear: Gear) -> float:
-    """A twist at the beginning of the last piece of a gear [rad]; of a linear one that of a small torque."""
+    """A twist at the beginning of the last piece of a gear [rad]; of a linear one, the twist under a small torque."""
     breaks, slopes = gear.stiffness.core().side(forward=True)  # type: ignore[union-attr]
     return breaks[-1] if breaks else 1e-3 * (gear.rated_output_torque or 1.0) / slopes[-1]
 
@@ -295,7 +295,7 @@ def speed_of(axis: Axis) -> float:
 
 
 def _speeds(axis: Axis, v: float, slip: float) -> dict[str, float]:
-    """Speeds of all shafts that turn with that of the reference at v; across a gear with hysteresis they differ by `slip`."""
+    """Speeds of all shafts that turn with the reference's shaft at speed v; across a gear with hysteresis they differ by `slip`."""
     train = axis.train
     found, waiting = {axis.shaft: v}, [axis.shaft]
     joints = [

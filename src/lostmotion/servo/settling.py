@@ -51,11 +51,11 @@ class Settling:
     last: bool
     """whether the position is held after the move for ever; otherwise until the next move begins"""
     reason: str = ""
-    """proof of it, or observation in vain"""
+    """a proof, or an observation that found nothing"""
     remaining: float = math.nan
     """error before the next move, or at the end of what was run [rad]; of a swing the largest one"""
     unseen: float = math.nan
-    """part of it that the encoder of the position does not see: the twist between its shaft and that of the reference [rad]"""
+    """the part that the encoder of the position does not measure: the twist between its shaft and the reference's shaft [rad]"""
     swing: float = 0.0
     """half of what the error swings by at the end of what was run [rad]"""
 

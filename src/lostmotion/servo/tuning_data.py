@@ -77,7 +77,7 @@ def _without_load(gear: Gear | Gearbox, speed: float) -> tuple[float, float]:
 
 
 def secant(gear: Gear | Gearbox) -> float:
-    """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque that of its last piece.
+    """Stiffness of a gear up to its rated torque, without its gap [N·m/rad]; without a rated torque, the stiffness of its last segment.
 
     If the directions differ, the softer one counts.
     """

@@ -29,7 +29,7 @@ from ..model.train import DriveTrain
 from ..response.linear import LinearModel
 
 POINTS, WEIGHTS = (0.5 * (x + s) for x, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
-"""of Gauss's formula over a tick, as shares of it"""
+"""weights of Gauss's formula over a tick, as shares of the tick"""
 
 
 def turn(angle: float) -> np.ndarray:
@@ -44,7 +44,7 @@ class Steady:
 
     torque_reference: float  # [N·m]
     wanted: np.ndarray  # i_d*, i_q* [A]
-    weakening: float  # by which i_d* is below that of the least current [A], not above 0
+    weakening: float  # by which i_d* is below the i_d of the least current [A], not above 0
     asked: np.ndarray  # voltage in the coordinates that are read at the sample [V]
 
 
@@ -220,7 +220,7 @@ class OrientedWinding:
 
     @cached_property
     def steady(self) -> Steady:
-        """With the torque of the regime, or with the largest part of it that current and voltage permit."""
+        """With the torque of the regime, or with the largest part that current and voltage permit."""
         found, low, high = self._kept(self.torque), 0.0, 1.0
         if found is not None:
             return found

@@ -49,7 +49,7 @@ def axis_variables(
 ) -> tuple[Variable, ...]:
     """Variables of the controllers of a run, by the prefix of their names.
 
-    sliding: by the same key, whether the motor moves a slide, and whether the position is that of one; left out, neither.
+    sliding: by the same key, whether the motor moves a slide, and whether the position is the position of a slide; left out, neither.
     """
     return tuple(
         Variable(f"{prefix}{name}", "", unit, meaning)

@@ -1,4 +1,4 @@
-"""Rules that tasks add to those of the drive check: each compares a demand of the cycle with a datum of a part.
+"""Rules that tasks add to the rules of the drive check: each compares a demand of the cycle with a datum of a part.
 
 A rule whose datum is missing gives the verdict "unknown" with the key that would give it, and never passes.
 """
@@ -61,7 +61,7 @@ def gearbox_life(demand: InputDemand, wanted: float) -> Finding:
 
 
 def output_bearing(g: Gearbox, radial: float | None, axial: float | None) -> list[Finding]:
-    """Radial and axial force on the output bearing [N] against those of the data sheet. Source: the data sheet."""
+    """Radial and axial force on the output bearing [N] against the limits of the data sheet. Source: the data sheet."""
     limits = g.limits
     found = []
     for name, force in (("radial", radial), ("axial", axial)):
@@ -216,7 +216,7 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
 def belt_rules(peak: float, belt: RatedBelt, *, key: str = "belt") -> list[Finding]:
     """Tension of a belt and the load of its teeth under the largest force of its slide [N].
 
-    Ratings that its table does not give are those of its profile and width. Sources: `catalogue_formulas.belt_force`,
+    Ratings that its table does not give come from its profile and width. Sources: `catalogue_formulas.belt_force`,
     `catalogue_formulas.tooth_forces` and `belt_ratings`.
 
     key: table of the belt, for what is missing.

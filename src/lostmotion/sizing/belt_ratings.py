@@ -60,7 +60,7 @@ def working_tension(belt: RatedBelt) -> float | None:
 
 
 def widths(profile: str) -> list[float]:
-    """Widths of a profile of which a sheet is in the catalogue [m]."""
+    """Widths of a profile for which the catalogue has a sheet [m]."""
     return sorted({sheet.width for sheet in _sheets(_spelling(profile)) if sheet.width is not None})
 
 

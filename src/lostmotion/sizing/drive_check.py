@@ -41,9 +41,10 @@ MEANS = ("average_output_torque", "average_input_speed", "motor_torque", "windin
 def check_drive(scenario: Scenario) -> Findings:
     """Check a drive or a drive train against its limits and its task.
 
-    The scenario is run. Loads, speeds, voltage, current and heat are those of that run, over the duty cycle of `task.cycle`, or with
-    the motion repeated without a pause. Limits are `gearbox.limits` and `motor.limits` (records of the catalogue include theirs) and
-    those of `task`. Rules without a limit are reported as unknown, and so are those that this train gives no answer to, with the reason.
+    The scenario is run. Loads, speeds, voltage, current and heat are taken from that run, over the duty cycle of
+    `task.cycle`, or with the motion repeated without a pause. Limits are `gearbox.limits` and `motor.limits` (records
+    of the catalogue include theirs) and the limits of `task`. Rules without a limit are reported as unknown, and so are those
+    that this train gives no answer to, with the reason.
 
     Parameters
     ----------

@@ -28,7 +28,7 @@ def inertia_ratio(
 ) -> Finding:
     """The same, of parts, with the largest permissible ratio: the one that is wanted, and the limit of the manufacturer.
 
-    Without either, 10 is the rule of thumb, and beyond it is a reservation. `key` is that of the motor's table.
+    Without either, 10 is the rule of thumb, and beyond it is a reservation. `key` is the motor's table.
     """
     ratio = ratio_of_inertias(motor, gearbox, load_inertia)
     printed = None if motor.limits is None else motor.limits.max_inertia_ratio

@@ -39,8 +39,9 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
         Over ``time`` [s]. A motor with a winding has `current` [A], i_q, the amplitude of a phase with the sign of the torque;
         `current_rms` [A]; and `voltage` [V], the amplitude of a phase with the decoupling, which may exceed `voltage_limit` since
         only u_q is limited. Under a current loop of kind ideal or first_order it is the voltage that torque and speed require.
-        With first_order it includes the voltage of the inductance, which has no bound in an ideal loop. Under field-oriented control the
-        amplitudes are those of both axes together, as in the run. Any other motor has `current` alone, torque / torque constant.
+        With first_order it includes the voltage of the inductance, which has no bound in an ideal loop. Under
+        field-oriented control the amplitudes belong to both axes together, as in the run. Any other motor has `current`
+        alone, torque / torque constant.
 
     Raises
     ------
@@ -125,7 +126,8 @@ def temperatures(
     repeated : bool
         Whether the run is a cycle that has been repeated until the temperatures repeat too, in closed form.
     constant_resistance : bool
-        Whether the resistance stays at its value for the reference temperature. Otherwise it rises by 0.393 % per kelvin, as copper does.
+        Whether the resistance stays at its value for the reference temperature. Otherwise it rises by 0.393 % per kelvin, as
+        copper does.
 
     Returns
     -------

@@ -48,10 +48,10 @@ ABOVE = 1.05
 def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = None) -> xarray.Dataset:
     """Compute the torques of a stepper over its step rate, from its data and from runs.
 
-    The runs keep all that the scenario has on the axis, and take the steps of its driver. An additional torque acts on the shaft of the
-    motor. For the pull-out torque the rotor begins in step, or with a winding is sped up slowly, and the torque then rises slowly until
-    it slips. For the pull-in torque the rotor is at rest when the field begins to turn at the whole rate, against dry friction. Both are
-    found by halving to 0.4 % of the holding torque.
+    The runs keep all that the scenario has on the axis, and take the steps of its driver. An additional torque acts on the
+    shaft of the motor. For the pull-out torque the rotor begins in step, or with a winding is sped up slowly, and the torque
+    then rises slowly until it slips. For the pull-in torque the rotor is at rest when the field begins to turn at the whole
+    rate, against dry friction. Both are found by halving to 0.4 % of the holding torque.
 
     Parameters
     ----------
@@ -67,8 +67,8 @@ def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = N
     xarray.Dataset
         Over ``step_rate`` [Hz]: ``pull_out_torque`` and ``pull_in_torque`` [N·m] from the data, ``pull_out_torque_of_runs`` and
         ``pull_in_torque_of_runs`` [N·m], and ``swing``, by how many full steps the rotor swings to each side of its mean lag without
-        additional torque; NaN where it slips. The pull-in torque from the data is that of a rotor with all inertia of the axis, ideal
-        current and no damping.
+        additional torque; NaN where it slips. The pull-in torque from the data holds for a rotor with all inertia of
+        the axis, ideal current and no damping.
 
     Raises
     ------
@@ -182,8 +182,8 @@ class _Axis:
     def pull_in(self, rate: float) -> float:
         """From the data: the largest torque T with which the rotor does not swing to where it slips.
 
-        It begins to turn at the lag asin(T/T_H), and the field then leads by n w. Its energy relative to the field is enough to pass the
-        unstable lag pi - asin(T/T_H) where n J w^2/2 > T_H (2 sqrt(1 - t^2) - t (pi - 2 asin t)) with t = T/T_H.
+        It begins to turn at the lag asin(T/T_H), and the field then leads by n w. Its energy relative to the field is enough
+        to pass the unstable lag pi - asin(T/T_H) where n J w^2/2 > T_H (2 sqrt(1 - t^2) - t (pi - 2 asin t)) with t = T/T_H.
         """
         speed = rate * self.motor.full_step
         energy = 0.5 * self.pole_pairs * self.inertia * speed * speed / self.torque

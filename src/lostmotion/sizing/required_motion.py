@@ -175,8 +175,8 @@ def check_motor(
     microsteps: int = 1,
 ) -> list[Finding]:
     """The rules for a motor at this gearbox, or with `slides` for a linear motor, whose ratio of inertias is not judged. `largest` is
-    the largest wanted ratio of the inertias: left out, the limit of the motor's record, or else 10. `microsteps` are those of the
-    driver of a stepper."""
+    the largest wanted ratio of the inertias: left out, the limit of the motor's record, or else 10. `microsteps`
+    belong to the driver of a stepper."""
     if largest is None and (motor.limits is None or motor.limits.max_inertia_ratio is None):
         largest = INERTIA_RATIO
     torque = demand.motor_torque(motor)

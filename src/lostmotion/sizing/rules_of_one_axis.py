@@ -30,7 +30,7 @@ def axis_rules(scenario: Scenario, axis: OneAxis | str, result: RunArrays) -> li
 
 
 def _inertias(scenario: Scenario) -> Finding:
-    """Ratio of the inertia of all that moves with the one motor to that of its rotor."""
+    """Ratio of the inertia of all parts that move with the one motor to the inertia of its rotor."""
     train = scenario.train()
     why = f"{len(train.motors) or 'no'} motors turn it" if len(train.motors) != 1 else tied_together(train)
     if why is not None:

@@ -48,7 +48,7 @@ def stepper_rules(scenario: Scenario, name: str, result: RunArrays) -> list[Find
 
 
 def speed_of_stepper(motor: Motor, speed: float, where: str = "motor") -> list[Finding]:
-    """Largest speed [rad/s] with that of the data sheet; nothing where none is given, as the pull-out curve then judges."""
+    """Largest speed [rad/s] and the limit of the data sheet; nothing where none is given, as the pull-out curve then judges."""
     limited = motor.limits is not None and motor.limits.max_speed is not None
     return [largest_speed(motor, speed, where)] if limited else []
 

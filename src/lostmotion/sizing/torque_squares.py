@@ -55,7 +55,7 @@ class Squares:
     def lead(self) -> float:
         """Bound on the integral from the start of an interval of the square less its mean [(N·m)² s], and of the error.
 
-        With M = m + d, the mean of d is 0 and that of d² is v. Cauchy and Schwarz bound the integral of d over a part of the
+        With M = m + d, the mean of d is 0 and the mean of d² is v. Cauchy and Schwarz bound the integral of d over a part of the
         interval h by h sqrt(v)/2. So the integral of M² - m² - v = 2 m d + d² - v is at most h (|m| sqrt(v) + v).
         """
         within = self.duration * (np.abs(self.mean) * np.sqrt(self.variance) + self.variance)

@@ -44,7 +44,7 @@ class LinearWinding(Winding):
 def whole_drive(kind: str, name: str, beside: Mapping[str, Any], guide_friction: float) -> tuple[Motor, Gearbox]:
     """Motor and gearbox of a record of one of the kinds `WHOLE`.
 
-    beside: values of the task that replace those of the record.
+    beside: values of the task that replace the record's values.
     guide_friction: friction coefficient of the guide of a slide, on which the attraction of a linear motor acts.
 
     Raises InputError: the record lacks what a run needs.

@@ -82,7 +82,7 @@ class ScrewRig:
         deflection: float = 0.0,
         without_error: bool = False,
     ) -> RunArrays:
-        """A run of the axis; friction is that of the rig on the input shaft, beside the screw's own drag."""
+        """A run of the axis; friction is the rig's on the input shaft, beside the screw's own drag."""
         screw = {n: getattr(self.screw, n) for n in self.screw.model_fields_set if n in ScrewData.model_fields}
         if without_error:
             screw.pop("pitch_error", None)
@@ -188,7 +188,7 @@ class ScrewRig:
         return driving if share > 0.0 else max(0.0, 1.0 / driving)
 
     def pitch_error(self) -> float:
-        """Travel of the slide less that of the lead [m], from peak to peak over a slow turn without a force."""
+        """Travel of the slide minus the travel of the lead [m], from peak to peak over a slow turn without a force."""
         speed = 2.0 * np.pi / TURN
         result = self._run(TURN, 720, inertia=FLYWHEEL, mass=LIGHT, damping=self._slow(), speed=speed)
         ideal = self._travel * result["input_angle"]

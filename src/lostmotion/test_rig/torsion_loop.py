@@ -12,7 +12,7 @@ from ..simulation.runs.switchings import names_in, unpacked
 
 
 def segment(twist: Any, torque: Any, low: float, high: float) -> tuple[float, float]:
-    """(slope, torque at twist 0) of a loading between two torques, by the middle 80 % of it; NaN of fewer than three samples."""
+    """(slope, torque at twist 0) of a loading between two torques, from its middle 80 %; NaN of fewer than three samples."""
     margin = 0.1 * (high - low)
     inside = (torque > low + margin) & (torque < high - margin)
     if np.count_nonzero(inside) < 3:

@@ -163,7 +163,7 @@ def _symbol(text: str) -> Product:
 
 
 def near(symbol: str) -> list[str]:
-    """Known symbols that are spelled alike, one for each unit: those of other case, else the nearest."""
+    """Known symbols that are spelled alike, one for each unit: spellings in other case, else the nearest."""
     alike = _by_lower_case().get(symbol.lower(), [])
     if not alike and len(symbol) > 1:
         likeness = {s: difflib.SequenceMatcher(None, symbol.lower(), s.lower()).ratio() for s in symbols()}
@@ -241,7 +241,7 @@ def written(units: Product) -> str:
 
 
 def angle_of(units: Product) -> int:
-    """The power of the plane angle, whose dimension is that of a plain number."""
+    """The power of the plane angle, whose dimension is the dimension of a plain number."""
     return sum(power for name, power in units.items() if _without_prefix(name) in ANGLES)
 
 

@@ -63,7 +63,7 @@ def _kind(value: Any) -> str:
 
 
 def _is_in_si(value: Any) -> bool:
-    """Whether the units that a DataArray carries, if any, are those of bare numbers."""
+    """Whether the units of a DataArray, if any, are the units of bare numbers."""
     attributes = getattr(value, "attrs", None)
     units = attributes.get("units", "") if isinstance(attributes, dict) else ""
     return not isinstance(units, str) or all(symbol in SI for symbol in re.split(r"[ *·/()^0-9.+-]+", units))

@@ -1,4 +1,4 @@
-"""The units of the grammar in SI. Prefixes are left out; the tests compare all of it with a unit library."""
+"""The units of the grammar in SI. Prefixes are left out; the tests compare all units with a unit library."""
 
 from __future__ import annotations
 

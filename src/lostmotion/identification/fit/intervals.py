@@ -32,8 +32,8 @@ class Interval:
 def bootstrap(problem: FitProblem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
     """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
 
-    Segments of the gradient of half a second each are drawn with replacement. So lasting errors, such as those of an
-    incomplete model, widen the interval. It is at least that of independent errors: a few blocks say little. With
+    Segments of the gradient of half a second each are drawn with replacement. Lasting errors, such as the errors of
+    an incomplete model, widen the interval. It is at least the interval of independent errors: a few blocks say little. With
     `CLUSTERS` logs or more, whole logs are drawn, too, and so are whole conditions of ``fit.leave_out``: errors that
     last through a log widen the interval. With `hidden`, weighted squares of residuals that no noise explains, it is
     wider by all that these can be the effect of. Along the directions that neither logs nor priors determine, the
@@ -133,7 +133,7 @@ def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndar
 
 
 def profile(problem: FitProblem, fit: Fit, name: str, points: int = 3) -> tuple[Interval, list[tuple[float, float]]]:
-    """By the values at which the loss, all other parameters fitted again, has risen by that of a 95 % interval.
+    """Interval between the values at which the loss, with all other parameters fitted again, has risen as much as at the ends of a 95 % interval.
 
     Returns tuple: the interval, and (value, rise of the loss) of the points that were fitted.
     """

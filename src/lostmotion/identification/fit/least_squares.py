@@ -56,7 +56,7 @@ class FitProblem:
     resolution: np.ndarray = field(default_factory=lambda: np.zeros(1))
 
     def deviations(self, residuals: Sequence[np.ndarray]) -> np.ndarray:
-        """Standard deviations of the channels, those not given from the residuals, not below those of the quantisation."""
+        """Standard deviations of the channels: given ones, others from the residuals, and none below the quantisation."""
         if self.given is not None:
             return self.given
         rows = np.hstack([r for r in self.compared(residuals) if np.isfinite(r).any(axis=1).all()])

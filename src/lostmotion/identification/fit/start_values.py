@@ -67,7 +67,7 @@ def regressed(
             try:
                 values, kept = _solved(rig, logs, point, free, shown, width)
             except InputError as problem:
-                refusal = refusal or str(problem)  # that of the narrowest filter, which has the most samples
+                refusal = refusal or str(problem)  # the refusal of the narrowest filter, which has the most samples
                 continue
             solved = solved or bool(values)
             there = ParameterPoint({**point.values, **values}, point.nuisance)

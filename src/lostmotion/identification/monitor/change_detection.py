@@ -147,7 +147,7 @@ def _present(
 
     Either nothing changes behind the baseline, or a step or a ramp begins at one of the values there. Both have the same prior
     probability, and so has each beginning and shape. Each of these hypotheses has a least squares estimate of the present value with
-    the deviation of the baseline. The interval is that of their mixture.
+    the deviation of the baseline. The result is the interval of their mixture.
     """
     centre = conditions[:baseline].mean(axis=0)
     rows = _Rows(x, variances, conditions - centre)

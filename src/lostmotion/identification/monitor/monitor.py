@@ -140,7 +140,7 @@ class MonitorResult:
         return [*found, *(f"  {text}" for text in [*(w.text for w in self.watched.values()), *noise, *self.inputs])]
 
 
-LEAST = 1e-9  # residual in those of the baseline: less is rounding, and the trend is that of logarithms
+LEAST = 1e-9  # residual relative to the baseline: a smaller one is rounding, and the trend is a trend of logarithms
 
 
 @checked
@@ -377,7 +377,7 @@ class _Estimator:
         return fit, self._engine.residuals(problem.logs, fit.point, problem.rung)
 
     def _as_before(self, problem: FitProblem, found: tuple[Fit, list[np.ndarray]]) -> bool:
-        """Whether the residuals are noise, or as small as those of other logs."""
+        """Whether the residuals are noise, or as small as the residuals of other logs."""
         return self._size(problem, found[1]) < LARGE * self._smallest or explained(problem, found[1])
 
     def _size(self, problem: FitProblem, residuals: Sequence[np.ndarray]) -> float:
@@ -388,7 +388,7 @@ class _Estimator:
 
 
 def _in_units_of_baseline(estimates: list[LogEstimate], baseline: int) -> list[LogEstimate]:
-    """With residuals in those of the baseline; logs far beyond these are marked, and take no part in the series of values."""
+    """Residuals relative to the residuals of the baseline; logs far beyond these are marked, and take no part in the series of values."""
     sizes = [e.residual for e in estimates[:baseline] if math.isfinite(e.residual)]
     if not sizes:
         first = next((e for e in estimates if e.why), None)

@@ -35,11 +35,11 @@ class LogEstimate:
     intervals: Mapping[str, Interval]
     """95 % intervals of the values, widened by what structured residuals may hide"""
     residual: float
-    """root mean square of the residuals, in those of the baseline; NaN of a log that cannot be used"""
+    """root mean square of the residuals, relative to the baseline; NaN of a log that cannot be used"""
     conditions: tuple[float, ...] = ()
     """values of ``monitor.conditions``"""
     told: frozenset[str] = frozenset()
-    """parameters of which the motion of this log says something"""
+    """parameters that influence the motion of this log"""
     why: str = ""
     """why the log is not used; empty if it is"""
 
@@ -175,7 +175,7 @@ class _Series:
         return Watched(name, p.unit, tuple(self.logs), change, first, level, change.before, now, beyond, decided, text)
 
     def residual(self, rate: float) -> Watched:
-        """With the sentence on the residuals, whose series is that of their logarithms."""
+        """Adds the sentence on the residuals, whose series is the series of their logarithms."""
         change = self.change("up", rate)
         if change is None or (lacking := self._lacking(change)):
             return self._undecided(RESIDUAL, "", change, self._lacking(change) if change is None else lacking)

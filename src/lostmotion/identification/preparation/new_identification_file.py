@@ -26,7 +26,7 @@ from .prepare import alike
 from .screening import screened
 
 MOST_LOGS = 2000
-RATE = 2e-3  # by which the sample time of a log may differ from that of most
+RATE = 2e-3  # by which the sample time of a log may differ from the sample time of most logs
 SAMPLE = re.compile(r", such as '.*' in line \d+")  # in notes: differs from log to log
 MOST_LINES = 40  # of doubts of one kind
 COMMANDS = ("goal", "command", "cmd", "reference", "ref", "setpoint", "target", "desired", "demand", "set")
@@ -253,7 +253,7 @@ def _about_units(c: _Seen, unit: str, names: Sequence[str]) -> str:
 
 
 def _about_rates(logs: Sequence[Log]) -> list[str]:
-    """Logs whose mean sample time is another than that of most: another rate, or a clock that runs fast or slow."""
+    """Logs whose mean sample time differs from the mean sample time of most logs: another rate, or a clock that runs fast or slow."""
     steps = np.array([log.interval for log in logs])
     other = [log for log, step in zip(logs, steps, strict=True) if abs(step / np.median(steps) - 1.0) > RATE]
     if not other:

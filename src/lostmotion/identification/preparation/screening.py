@@ -63,7 +63,7 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
 
 
 def _rising(log: Log) -> Log:
-    """Time stamps that rise: those not finite or going back are dropped, those of a coarse clock spread."""
+    """Time stamps that rise: samples that are not finite or go back are dropped, and samples of a coarse clock are spread."""
     finite = np.isfinite(log.time)
     if not finite.all():
         log = log.only(finite, f"dropped {counted(np.sum(~finite), 'sample')} without a time")
@@ -279,7 +279,7 @@ def _at_rest(x: np.ndarray, begin: int, end: int, others: Sequence[np.ndarray]) 
     for first, last in constant_stretches(x):
         moving[first:last] = np.nan
     second, third = (float(np.nanmedian(np.abs(np.diff(moving, order)))) for order in (2, 3))
-    # Third differences of white noise are 1.8 times the second ones; those of a smooth motion are far smaller.
+    # Third differences of white noise are 1.8 times the second ones; the differences of a smooth motion are far smaller.
     resolution = float(np.min(step[step > 0.0]))
     if third > 0.9 * second and second > 4.0 * resolution:
         return False

@@ -1,8 +1,8 @@
 """Tables with a header of many lines, a column of the time for each channel, or lines and cells that cannot be read.
 
 Oscilloscopes and controllers write lines of `key value` above the table. Exports of PLC scopes have a pair of columns for each
-channel, its time and its values. Above them are lines of `key value key value`, one pair for each channel. A line that was cut off and
-a cell such as `ERROR` cost only themselves, as long as they are few.
+channel, its time and its values. Above them are lines of `key value key value`, one pair for each channel. A line that was
+cut off and a cell such as `ERROR` cost only themselves, as long as they are few.
 """
 
 from __future__ import annotations
@@ -37,7 +37,7 @@ def odd_table_log(
 
     rows, number, comments, time: as in `table_log`.
 
-    Raises UnreadError: there is no table, or too much of it would be lost.
+    Raises UnreadError: there is no table, or too many rows would be lost.
     """
     begin = next((k for k in range(min(HEADER, len(rows))) if _begins(rows[k : k + IN_ROW], number)), None)
     if begin is None:

@@ -1,4 +1,4 @@
-"""A log: channels over time in SI units, what its header says, and what was dropped of it."""
+"""A log: channels over time in SI units, the values of its header, and notes on dropped samples."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ class _Blocks:
         return name, links, length - 24 - 8 * count
 
     def chain(self, at: int) -> Iterator[list[int]]:
-        """Links of the blocks of a list, each of which names the next by its first link."""
+        """Links of the blocks of a list. The first link of each block leads to the next."""
         seen = set()
         while at:
             if at in seen:

@@ -51,7 +51,7 @@ class Recording:
 def read_mcap_log(path: Path, *, time: str = "") -> Log:
     """Read an MCAP file: the numbers of its messages are channels ``TOPIC.FIELD``, ``TOPIC.FIELD[0]`` of lists; units are SI.
 
-    All are at the publish times of one topic; those of others are read from straight lines between their messages. Metadata
+    All are at the publish times of one topic; channels of other topics are interpolated linearly between their messages. Metadata
     of the file are the header.
 
     time: the topic of the times; default: the topic of the first message. ``TOPIC.header.stamp`` takes the stamps in
@@ -72,7 +72,7 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
 def read_ros_bag(path: Path, *, time: str = "") -> Log:
     """Read a bag of ROS 1 (``.bag``) or ROS 2 (``.db3``): channels as of MCAP files, at the times of recording.
 
-    Messages of ROS 2 bags that do not hold their definitions are taken for those of Humble.
+    Messages of ROS 2 bags without definitions are read by the definitions of Humble.
 
     Raises MissingLibraryError: rosbags is not installed.
     """
@@ -148,7 +148,7 @@ def _read_mcap(path: Path) -> Recording:
 
 
 def _mcap_records(path: Path, file: BinaryIO) -> Iterator[Any]:
-    """Records in the order of the file, those of chunks included."""
+    """Records in the order of the file, with the records of chunks."""
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader, breakup_chunk
 
@@ -206,8 +206,8 @@ def _types(text: str, name: str, *, idl: bool) -> dict[str, Any]:
     """Types that a definition holds, checked before the library writes and runs code that reads them.
 
     The library takes only letters, digits and underscores into names, and writes out values as literals. Definitions
-    that it would process without limit are refused here. They are fixed lists of words or messages, for each entry of
-    which it writes lines of code. They are also lists of messages without any byte, and shifts to numbers of any
+    that it would process without limit are refused here. They are fixed lists of words or messages: the library
+    writes lines of code for each entry. They are also lists of messages without any byte, and shifts to numbers of any
     length.
 
     Raises ValueError: the definition is too large; the library raises errors of its own where it cannot be read.

@@ -131,7 +131,7 @@ def _check(path: Path, archive: zipfile.ZipFile) -> None:
 
 
 class _Part:
-    """Content of a part of a workbook, by a parser that keeps nothing of it."""
+    """Content of a part of a workbook, by a parser that stores nothing."""
 
     def __init__(self, path: Path, name: str) -> None:
         self.path, self.name = path, name

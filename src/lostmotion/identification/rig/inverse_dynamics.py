@@ -129,7 +129,7 @@ def _over_angle(t: Any, angle: np.ndarray) -> np.ndarray:
 
 
 def _check(scenario: Scenario) -> None:
-    """Whether its torques are those of the formula above."""
+    """Whether its torques follow the formula above."""
     train = scenario.train()
     holding = [key for key, coupling in train.couplings() if coupling.holds]
     if holding := [*holding, *(key for key, element in train.on_shafts() if not hasattr(element, "over_angle"))]:

@@ -78,7 +78,7 @@ def names_of_channel(rig: Rig, channel: str) -> frozenset[str]:
 
 
 def windows(rig: Rig, logs: Sequence[Prepared], point: ParameterPoint, rung: int, length: float) -> list[Prepared]:
-    """Logs in windows, each run of which begins at the angle and the speed that were measured there, or at the speed alone.
+    """Logs in windows. Each run begins at the angle and the speed that were measured there, or at the speed alone.
 
     length: of a window [s].
 

@@ -24,7 +24,7 @@ from .measured_motion_input import GIVEN_SPEED
 from .measurement_model import Measuring, Probe, delays_that_name, numbers_of
 from .rig_scenario import Built, Rig
 
-STEP = 2.0**-24  # of a value or its scale: the step and the rounding of a difference over it are some 1e-8 of it
+STEP = 2.0**-24  # of a value or its scale: the step and the rounding of a difference over it are some 1e-8 of the value
 STEP_OF_CONTROLLERS = (
     2.0**-11
 )  # with the differences of fourth order of `sensitivities`, which see the limits of controllers
@@ -313,7 +313,7 @@ def _refuse_held_delay(task: Identification, name: str, references: set[str]) ->
 
 
 def _begun(changes: Mapping[str, Any], segment: Segment, known: Mapping[str, Any]) -> dict[str, Any]:
-    """With the measured state at which a segment begins, in place of that of the rig."""
+    """Starts from the measured state at which a segment begins, in place of the rig's initial state."""
     if segment.initial is None:
         return dict(changes)
     own = {

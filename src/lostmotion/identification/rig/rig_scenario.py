@@ -80,7 +80,7 @@ class Rig:
     task: the identification.
     directory: that file names are relative to.
 
-    Raises InputError: the scenario cannot be used, or an input or a variable is none of it.
+    Raises InputError: the scenario cannot be used, or it has no such input or variable.
     """
 
     def __init__(self, task: Identification, directory: Path) -> None:
@@ -197,7 +197,7 @@ class Rig:
         return {key: _value(formulas[key], values, key) for key in (formulas if keys is None else keys)}
 
     def built(self, changes: Mapping[str, Any]) -> Built:
-        """The scenario with values by dotted key; those of the initial state are left out."""
+        """The scenario with values by dotted key; variables of the initial state are left out."""
         kept = {key: value for key, value in changes.items() if not key.startswith("initial.")}
         name = repr(kept)
         found = self._built.get(name)

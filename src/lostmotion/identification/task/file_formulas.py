@@ -32,7 +32,7 @@ Values = Mapping[str, Any]
 class Formula:
     """Arithmetic of named values: ``+ - * / **``, comparisons, ``and or not``, `FUNCTIONS` and `CONSTANTS`.
 
-    Nothing of it is ever run as Python.
+    The text is never run as Python.
 
     text: as written; a number is a constant.
     functions: functions that it may call; a NumPy ufunc takes its number of arguments.

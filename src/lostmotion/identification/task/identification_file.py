@@ -150,14 +150,14 @@ class Identification(Part):
     """candidate models, from few to many parameters; left out, one with all parameters"""
     fit: FitOptions = FitOptions()
     record: str = ""
-    """``gear.NAME`` of the rig, of which a data sheet is written"""
+    """``gear.NAME`` of the rig, for which a data sheet is written"""
     monitor: Monitoring = Monitoring()
     """values that `lostmotion monitor` compares over the life of a drive"""
 
     @model_validator(mode="before")
     @classmethod
     def _read_multi_start(cls, data: Any) -> Any:
-        """Texts of `multi_start` in the unit of their parameter, as those of its start value are read."""
+        """Texts of `multi_start` in the unit of their parameter, like the start value."""
         if not isinstance(data, Mapping):
             return data
         ladder, parameters = data.get("ladder"), data.get("parameters")

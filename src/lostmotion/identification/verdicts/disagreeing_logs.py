@@ -1,9 +1,9 @@
 """Logs that disagree with the others, and the fault that explains each.
 
-A log whose residuals are several times those of the other logs is set aside, and the model is fitted to the rest. Common faults are
-then undone one by one: signs, units, delays, clocks of another rate, counters that wrap, frozen and slow channels. A fault explains
-a log if undoing it brings the residuals down to those of the other logs. Such a log is left out of the fit; one that no fault explains
-stays in it, since the model may be what is wrong.
+A log whose residuals are several times the residuals of the other logs is set aside, and the model is fitted to the rest.
+Common faults are then undone one by one: signs, units, delays, clocks of another rate, counters that wrap, frozen and slow
+channels. A fault explains a log if undoing it brings its residuals down to the residuals of the other logs. Such a log is
+left out of the fit; one that no fault explains stays in it, since the model may be what is wrong.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ from .residual_tests import explained
 SUSPECT = 3.0  # times the median residual of the other logs, from which on the faults are tried
 ODD = 6.0  # the same, from which on a log that no fault explains is reported
 MENDED = 2.0  # times the median residual, up to which a log agrees with the others
-FEWEST = 3  # logs, of which one can disagree with the others
+FEWEST = 3  # least number of logs, so that one can disagree with the others
 FEW = 8  # logs, up to which each is left out in turn if the residuals are not noise
 SHARE = 3  # at most one of as many logs is set aside at once
 ROUNDS = 3
@@ -117,7 +117,7 @@ def odd_logs(
 
 
 class _Sizes:
-    """Residuals of logs at a point, in units of those of logs that agree."""
+    """Residuals of logs at a point, relative to the residuals of logs that agree."""
 
     def __init__(self, rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> None:
         self.rig, self.engine, self.point, self.rung = rig, engine, point, rung
@@ -131,7 +131,7 @@ class _Sizes:
         self.relative = np.maximum(np.median(relative, axis=0), 1e-300)
 
     def of(self, log: Prepared) -> tuple[np.ndarray, float]:
-        """(residuals of each measured channel [SI], ratio to those of the other logs)."""
+        """(residuals of each measured channel [SI], ratio to the residuals of the other logs)."""
         return self.of_each([log])[0]
 
     def of_each(self, logs: Sequence[Prepared]) -> list[tuple[np.ndarray, float]]:
@@ -197,7 +197,7 @@ def _agreeing(
 def _leave_one_out(
     rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
 ) -> tuple[list[Prepared], ParameterPoint]:
-    """The same for few logs, of which one may have spoiled the fit so that it does not stand out."""
+    """The same for few logs: one of them may have spoiled the fit so that it does not stand out."""
     problem = problem_of(rig, engine, train, rung)
     if len(train) > FEW or explained(problem, engine.residuals(train, fit.point, rung)):
         return train, fit.point
@@ -231,7 +231,8 @@ def _fitted(
 def _explained(rig: Rig, log: Prepared, sizes: _Sizes, *, search_times: bool) -> tuple[str, np.ndarray]:
     """(the fault that explains a log, its residuals without it); no fault if none of those tried does.
 
-    Late inputs and clocks take a run for each delay and rate, so that they are tried last, and only if no fault of another kind explains the log.
+    Late inputs and clocks take a run for each delay and rate, so that they are tried last, and only if no fault of another
+    kind explains the log.
     """
     nothing = "", np.array([])
     if any(segment.initial for segment in log.segments):  # its start was taken from the values in question

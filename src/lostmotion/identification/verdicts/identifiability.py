@@ -225,7 +225,7 @@ def _determined_of_two(
 
 
 def _departure(problem: FitProblem, fit: Fit, values: Mapping[str, float]) -> float:
-    """Root of the sum of squares, in deviations, by which runs with some other values depart from those of the fit."""
+    """Root of the summed squares of the differences, in deviations, between runs with some other values and the runs of the fit."""
     there = replace(fit.point, values=fit.point.values | dict(values))
     runs = [problem.engine.residuals(problem.logs, point, problem.rung) for point in (fit.point, there)]
     scale = fit.deviations[:, None]

@@ -1,4 +1,4 @@
-"""Whether residuals are those of noise: their size against the stated deviation, their runs, their correlation and their shape."""
+"""Whether residuals are noise: their size against the stated deviation, their runs, their correlation and their shape."""
 
 from __future__ import annotations
 

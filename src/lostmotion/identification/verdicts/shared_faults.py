@@ -1,8 +1,8 @@
 """Faults that several logs share: what these logs have in common, and the limit or filter of an input that would explain them.
 
-A delay, an offset or a wrong rate of the clock in one log is a fault of its record. In several logs of one kind it is rather an effect
-that the model lacks. For example, a firmware that limits the rate of its goal shows as a delay of the logs with large steps. Such logs
-stay in the fit.
+A delay, an offset or a wrong rate of the clock in one log is a fault of its record. In several logs of one kind it is rather
+an effect that the model lacks. For example, a firmware that limits the rate of its goal shows as a delay of the logs with
+large steps. Such logs stay in the fit.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class SharedFault:
     --------
     >>> from lostmotion.identification.verdicts.shared_faults import SharedFault
     >>> print(SharedFault(("1.csv", "4.csv"), 9, "the inputs are 30 to 60 ms late", "steps = 1 (2 of 2 such logs)", "").text)
-    2 of 9 logs (1.csv, 4.csv): the inputs are 30 to 60 ms late; in common: steps = 1 (2 of 2 such logs); a fault that logs share is the model's, so that they stay in the fit
+    2 of 9 logs (1.csv, 4.csv): the inputs are 30 to 60 ms late; in common: steps = 1 (2 of 2 such logs); a fault that logs
+    share is the model's, so that they stay in the fit
     """
 
     logs: tuple[str, ...]
@@ -251,7 +252,7 @@ def _is_number(word: str) -> bool:
 def _candidate(
     rig: Rig, engine: Engine, own: Sequence[Prepared], rest: Sequence[Prepared], point: ParameterPoint, rung: int
 ) -> str:
-    """Limit of the rate or filter of an input with which the residuals of some logs are far smaller, and those of the others not larger."""
+    """Limit of the rate, or filter, of an input that makes the residuals of some logs far smaller and no others larger."""
     some, others = [_fresh(log) for log in own[:TRIED]], [_fresh(log) for log in rest[:TRIED]]
     best: tuple[float, str] = (BETTER, "")
     before, before_others = (_size(engine, x, point, rung) for x in (some, others))

@@ -3,7 +3,7 @@
 A slip from the errors ``e + x d``, ``-1 <= x <= 1``, is ``sum of c_k exp(l_k t) (a_k + x b_k + r_k)`` over the modes,
 with unknown ``|r_k| <= radius_k`` left by the stuck interval before it. Between two instants a function departs from
 its chord by at most an eighth of the square of their distance, times the largest second derivative. The latter is
-bounded by that of each mode at the earlier instant. All bounds are widened by what floating point rounds.
+bounded by the value of each mode at the earlier instant. All bounds are widened by what floating point rounds.
 """
 
 from __future__ import annotations

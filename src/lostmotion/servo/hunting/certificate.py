@@ -109,7 +109,7 @@ def hunting_certificate(
 
     While the contact is stuck, the integrator winds up in proportion to the error until the contact breaks away; the
     slip leaves another error. Slip and stuck interval are linear, and so the map from one error to the next follows
-    exactly from their matrices. A fixed point of it is a limit cycle. The verdict follows from bounds of the map over
+    exactly from their matrices. A fixed point of the map is a limit cycle. The verdict follows from bounds of the map over
     intervals of errors. *Hunts* means that it maps a band of errors without rest into itself. *Does not hunt* means
     that each slip reduces its error. The bounds are computed in floating point and widened by what that may round.
 
@@ -321,7 +321,7 @@ def _map(contact: StickSlip, proof: Proof, largest: float) -> list[tuple[float, 
 
 
 def _fixed_points(contact: StickSlip, points: list[tuple[float, Image]]) -> list[FixedPoint]:
-    """Errors of which a slip leaves the same of the other sign."""
+    """Errors whose slip leaves the same error with the other sign."""
     sums = [math.nan if i.reason else i.middle + e for e, i in points]
     brackets = [k for k in np.flatnonzero(np.diff(np.sign(sums))) if sums[k] * sums[k + 1] <= 0.0]
     return [_fixed_point(contact, points[k][0], points[k + 1][0], sums[k], sums[k + 1]) for k in brackets]

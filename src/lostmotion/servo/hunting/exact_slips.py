@@ -305,7 +305,7 @@ class Slips:
 
 
 def _integrals(a: float, time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Integral of ``exp(a t)`` over a time, and that of this integral."""
+    """Integral of ``exp(a t)`` over a time, and the integral of this integral."""
     x = a * time
     small = np.abs(x) < 1e-5
     safe = np.where(small, 1.0, x)

@@ -48,9 +48,9 @@ class Hunting:
     motion: xarray.Dataset | None
     """one period, with the Jacobian of the map over it, of an exact one"""
     multipliers: np.ndarray
-    """Floquet multipliers of an exact one, without that of its phase, which is 1"""
+    """Floquet multipliers of an exact one, without the multiplier of its phase, which is 1"""
     causes: tuple[str, ...]
-    """without which there is no limit cycle, or less than half of it: backlash, dry friction, static friction (in excess of the
+    """causes without which there is no limit cycle, or less than half of the amplitude: backlash, dry friction, static friction (in excess of the
     friction in motion), saturation, encoder resolution"""
 
     @property
@@ -86,7 +86,7 @@ def limit_cycle(scenario: Scenario, *, motor: str | None = None, causes: bool = 
     Parameters
     ----------
     scenario : Scenario
-        Its inputs must come to rest. Its duration is that of the shortest run; longer ones follow if it does not suffice.
+        Its inputs must come to rest. Its duration is the duration of the shortest run; longer ones follow if it does not suffice.
     motor : str, optional
         Name of the motor whose sampled controller is examined. Default: the only one.
     causes : bool

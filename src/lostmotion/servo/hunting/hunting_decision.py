@@ -3,7 +3,7 @@
 A state in which all contacts are stuck is no proof of rest: an integrator that still moves breaks a contact away.
 From one frame, the time after which all sample times of the controllers repeat, to the next, stuck drive and
 controllers are a map. Where it takes the state into itself, the state is an equilibrium. If its numbers are
-polynomials of time of second degree, as those of two integrators in series are, so are the torques of the contacts.
+polynomials of time of second degree, as with two integrators in series, so are the torques of the contacts.
 They give the time of the break-away.
 """
 
@@ -284,7 +284,7 @@ class WatchedRun:
         return float(np.mean(np.diff(self.rises())))
 
     def quick_frequency(self, variable: int, swing: float) -> float:
-        """By a sample each tick [Hz], which those of a long watch may be too far apart for; NaN of a slower one."""
+        """By one sample each tick [Hz], since the samples of a long watch may be too far apart; NaN of a slower one."""
         if self.frame == 0.0:
             return math.nan
         values = []

@@ -69,7 +69,7 @@ class LimitCycle:
 
     @property
     def causes(self) -> list[str]:
-        """Without which there is no limit cycle, or less than half of it."""
+        """Causes without which there is no limit cycle, or less than half of the amplitude."""
         if not self.whole.cycles:
             return []
         low = PART * self.whole.motor_amplitude

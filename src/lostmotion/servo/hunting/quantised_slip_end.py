@@ -113,7 +113,7 @@ def _one_way(effects: np.ndarray, falls: np.ndarray) -> np.ndarray:
     Each reading differs from the angle by ``n``, from -1 to 1. As no reading is below the one before, ``n`` falls by no more than the
     angle has grown, ``f``. With any ``t`` above 0, ``a n + a' n' <= t f + |a - t| + |a' + t|``, where n' follows n.
 
-    effects: ``a`` of each row and reading, the last being that of the stuck interval.
+    effects: ``a`` of each row and reading, the last for the stuck interval.
     falls: ``f`` of each box, from the last but two readings to the last but one, and from there to the last.
     """
     kept, total = effects.copy(), np.zeros((falls.shape[1], len(effects)))

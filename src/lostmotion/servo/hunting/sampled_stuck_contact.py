@@ -30,7 +30,7 @@ from .stuck_contact import NONE, AtRestError, UndecidableError, only_contact, ot
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
 DOUBLINGS = 40  # of the time until what is not the ramp of the integrator has settled
 SETTLED = 1e-9  # relative change of the ramp from frame to frame
-MOST_SETTLING = 20_000  # ticks of it
+MOST_SETTLING = 20_000  # ticks
 
 
 @dataclass(frozen=True)

@@ -117,7 +117,7 @@ def kept_beside(pieces: Pieces, bound: np.ndarray, side: float) -> tuple[Pieces,
     reach, over = (
         side * (bound - inner),
         side * (bound - outer),
-    )  # positive where part of a piece, and where all of it, is kept
+    )  # positive where part of a piece, and where the whole piece, is kept
     w, width = pieces.strip, pieces.strip[:, 1] - pieces.strip[:, 0]
     some, whole = _zero_between(reach, w), _zero_between(over, w)
     none = math.inf

@@ -3,7 +3,7 @@
 A set is a box of unknowns: ``z = centre + G x``, every ``x`` between -1 and 1. From sample to sample it moves exactly,
 as slip, stuck interval and controller are affine. Where a box contains several readings of the encoder, or both ends
 and goes on, it is divided. Both parts keep what the division along the largest unknown cannot separate, so that no
-state is lost. What stops is collected by its reading, and goes on as one box around all of it.
+state is lost. Sets that stop are collected by their reading, and go on as one box around all of them.
 """
 
 from __future__ import annotations

@@ -3,7 +3,8 @@
 Deviations from the state of rest without friction obey ``y' = A y`` while the contact slips forward, if the torque
 ``T_C`` that friction takes is added to the integrator. While it is stuck, an integrator winds up at a rate in
 proportion to the error ``e``; all else settles. A slip then begins at ``y = e q + (T_S - T_C) p``. Here `q` is the
-settled state of unit error with a contact torque of 0, and `p` that of a contact torque of 1 without error.
+settled state of unit error with a contact torque of 0, and `p` the settled state of a contact torque of 1 without
+error.
 """
 
 from __future__ import annotations

@@ -14,8 +14,8 @@ from ..scenario.scenario import Scenario
 class BatchParameters(Mapping[str, np.ndarray]):
     """Parameters of the drives of a batch by their keys in a scenario file: arrays in SI units with a value for each drive.
 
-    What is written into such an array acts from the next step on. Iteration is over the keys that have been asked for, and those
-    of `vary`.
+    What is written into such an array acts from the next step on. Iteration is over the keys that have been asked
+    for, and the keys of `vary`.
 
     Examples
     --------

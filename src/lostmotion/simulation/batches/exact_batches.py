@@ -128,7 +128,7 @@ class ExactBatch:
 
 
 def _train_of(scenario: Scenario, shaft: str | None) -> _core.Train:
-    """The solver's train, a shaft or slide of it moved from outside if one is named."""
+    """The solver's train; if a shaft or slide is named, its motion is given from outside."""
     if shaft is None:
         return scenario.core()
     if shaft not in scenario.train().shafts:

@@ -64,7 +64,8 @@ class SimulationBatch:
         A sampled controller for the one motor of all drives, or one for each, which runs at its own sample instants within the
         steps. It is tuned to the drives of `drives`, not to what varies.
     given_motion
-        The shaft or slide whose motion is given to `step`, as by a multibody engine; True: the last of the train, the load of a drive.
+        The shaft or slide whose motion is given to `step`, as by a multibody engine; True: the last of the train, the load of
+        a drive.
 
     Raises
     ------
@@ -185,22 +186,23 @@ class SimulationBatch:
         ----------
         command
             Where there is one command or reference: a number, or an array with a number for each drive. Of a motor the share of the
-            rated voltage, of a torque source of its rated torque, as of `simulate`; of a controller its reference: position [rad], speed
-            [rad/s] or torque [N·m].
+            rated voltage, of a torque source of its rated torque, as of `simulate`; of a controller its reference: position
+            [rad], speed [rad/s] or torque [N·m].
         load_torque
             Where there is one load: the torque [N·m] or force [N] that it takes, in the same way.
         motion
             With `given_motion`, at the end of the step: ``speed`` [rad/s], and if wanted ``angle`` [rad] and ``acceleration``
-            [rad/s²], each a number or an array. The course within the step is that of `Simulation.advance`. The torque
+            [rad/s²], each a number or an array. The course within the step is the same as in `Simulation.advance`. The torque
             that this takes is the variable ``load_drive_torque``.
         inputs
-            The same by the names in `inputs`, such as ``first_motor_command=0.2``. All commands are to be given; a load that is left out
-            is 0.
+            The same by the names in `inputs`, such as ``first_motor_command=0.2``. All commands are to be given; a load that
+            is left out is 0.
 
         Raises
         ------
         InputError
-            An argument has another shape, or is not finite; an input is missing or unknown; the motion is missing, or not to be given.
+            An argument has another shape, or is not finite; an input is missing or unknown; the motion is missing, or not to
+            be given.
         SolverError
             The motion of a drive has no continuation. That drive stays where it was; all others are advanced.
         """
@@ -314,9 +316,9 @@ class SimulationBatch:
         which
             Array of Booleans with the drives that are meant; default all.
         initial
-            States at t = 0 by the names of their variables, in SI units, each a number or an array with one for each drive; those left
-            out are 0. Of a motor, a gearbox and a load they are ``motor_torque``, ``motor_speed``, ``load_speed``, ``twist`` and
-            ``load_angle``.
+            States at t = 0 by the names of their variables, in SI units, each a number or an array with one for each drive;
+            those left out are 0. Of a motor, a gearbox and a load they are ``motor_torque``, ``motor_speed``, ``load_speed``,
+            ``twist`` and ``load_angle``.
 
         Raises
         ------
@@ -343,10 +345,11 @@ class SimulationBatch:
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a variable (SI), one for each drive.
 
-        Of a motor, a gearbox and a load without controllers, the states ``motor_speed``, ``load_speed``, ``twist`` and ``load_angle`` are
-        the memory that each step writes anew. It exports DLPack, so that ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it
-        to keep it. ``motor_torque``, ``output_torque``, ``input_contact`` and ``twist_contact`` are new arrays. Of other trains all result
-        variables are such memory, among them what the controllers show.
+        Of a motor, a gearbox and a load without controllers, the states ``motor_speed``, ``load_speed``, ``twist`` and
+        ``load_angle`` are the memory that each step writes anew. It exports DLPack, so that
+        ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it to keep it. ``motor_torque``, ``output_torque``,
+        ``input_contact`` and ``twist_contact`` are new arrays. Of other trains all result variables are such memory, among
+        them what the controllers show.
         """
         if name in self._core.variables:
             return self._core.read(name)
@@ -363,7 +366,7 @@ class SimulationBatch:
         Raises
         ------
         InputError
-            The snapshot is that of another batch.
+            The snapshot belongs to another batch.
         """
         try:
             self._core.restore(state.core)

@@ -106,7 +106,7 @@ class WalkedBatch:
         return tuple(self._states)
 
     def read(self, name: str) -> np.ndarray:
-        """Values of a variable; those of states each step writes anew."""
+        """Values of a variable; outputs of states are written anew by each step."""
         computed = self._computed.get(name)
         return self._states[name] if computed is None else computed()
 

@@ -120,7 +120,7 @@ def on_slide(tables: dict[str, Any]) -> None:
 
 
 def axis_schema() -> dict[str, Any]:
-    """JSON Schema of scenario files in this form, made of that of the long form."""
+    """JSON Schema of scenario files in this form, made from the schema of the long form."""
     whole = train_schema()
     definitions = whole["$defs"]
 

@@ -50,7 +50,7 @@ class Initial(Part):
     hysteresis_capacity: Annotated[Torque, NotNegative] = 0.0
     """h, which the last turning point before t = 0 left behind"""
     on_reference: Switch = False
-    """angle and speeds are those of the controller's reference at t = 0"""
+    """angle and speeds equal the controller's reference at t = 0"""
 
     @kept
     def of_train(self) -> TrainInitial:
@@ -70,7 +70,7 @@ class Initial(Part):
     def of_state(
         cls, state: TrainInitial, shaft: str = MOTOR, load: str = LOAD, motor: str = MOTOR, gear: str = GEARBOX
     ) -> Initial:
-        """The state of a drive from that of its train, whose shafts, motor and gear have these names.
+        """The state of a drive from the state of its train, whose shafts, motor and gear have these names.
 
         Raises
         ------

@@ -61,7 +61,7 @@ def start_values(
 
 
 def _refuse_contradiction(train: DriveTrain, given: Mapping[str, float]) -> None:
-    """Refuses two given speeds, one of which says the other through what is rigid between them."""
+    """Refuses two given speeds where one follows from the other through rigid parts between them."""
     for one, speed in given.items():
         tied = tied_speeds(train, {one: speed})
         for other in (name for name in given if name in tied and name != one):
@@ -165,7 +165,7 @@ def given_speeds(train: DriveTrain, motions: Mapping[str, tuple[Signal[Any], Sig
 
 
 def tied_speeds(train: DriveTrain, given: Mapping[str, float]) -> dict[str, float]:
-    """Speeds [rad/s, m/s] that are given, and those of other shafts and slides that rigid gears tie to them."""
+    """Speeds [rad/s, m/s] that are given, and the speeds of other shafts and slides that rigid gears tie to them."""
     gears = train.fixed_gears().values()
     tied = [g for g in gears if isinstance(g.stiffness, Rigid) and not g.stiffness.strikes]
     rigid = [(g.input, g.output, g.ratio) for g in tied]

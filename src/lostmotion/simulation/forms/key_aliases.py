@@ -45,7 +45,7 @@ class Form:
 
     keys: tuple[tuple[str, str], ...]  # keys of the long form, and what they are called
     back: tuple[tuple[str, str], ...]
-    """keys of what is kept of it, and of the tables that a scenario is read from again"""
+    """keys of derived data, and of the tables that a scenario is read from again"""
 
     def in_file(self, key: str) -> str:
         """A key of the long form as files have it; others as they are."""

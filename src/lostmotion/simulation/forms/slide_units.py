@@ -1,4 +1,4 @@
-"""Values of controllers and tasks that are given for slides: with units of length and force where a shaft has those of angle and torque."""
+"""Values of controllers and tasks that are given for slides: with units of length and force where a shaft has units of angle and torque."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ...inputs.schema import follow, unit_in_schema
 from ...inputs.validation import shown
 from ...units.conversion import Unit
 
-# Keys of a controller that belong to the shaft of its reference, and to those of its encoders.
+# Keys of a controller that belong to the shaft of its reference, and keys that belong to the shafts of its encoders.
 OF_REFERENCE = (
     ("reference",),
     ("position", "speed_limit"),

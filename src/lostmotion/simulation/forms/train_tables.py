@@ -68,7 +68,7 @@ class TrainInitial(Part):
     speeds: Elements[Speed] = Field(default_factory=nothing)
     """speeds of shafts"""
     angles: Elements[Angle] = Field(default_factory=nothing)
-    """angles of shafts; those of others follow through the gears"""
+    """angles of shafts; angles of the others follow through the gears"""
     twists: Elements[Angle] = Field(default_factory=nothing)
     """twists of gears with a stiffness"""
     positions: Elements[Length] = Field(default_factory=nothing)
@@ -86,7 +86,7 @@ class TrainInitial(Part):
     hysteresis_forces: Elements[Annotated[Force, NotNegative]] = Field(default_factory=nothing)
     """the same of screws, racks and belts"""
     on_reference: Switch = False
-    """angles of the shafts of controllers, and the speeds of all that turns with them, are those of their references at t = 0"""
+    """angles of the shafts of controllers, and the speeds of all that turns with them, equal their references at t = 0"""
 
     def of_train(self) -> TrainInitial:
         """The state of a drive train: this one."""
@@ -97,11 +97,11 @@ class TrainInitial(Part):
         return TrainInitial(angles=self.of_all("angles"), twists=self.of_all("twists"))
 
     def of_all(self, key: str) -> dict[str, float]:
-        """The values of a key with those of slides or what moves them."""
+        """The values of a key, with the values of slides or what moves them."""
         return {**getattr(self, key), **getattr(self, LINEAR_INITIAL[key])}
 
 
-# Keys of `initial` for shafts and gears, and those of the same quantity for slides and what moves them.
+# Keys of `initial` for shafts and gears, with the keys of the same quantity for slides and what moves them.
 LINEAR_INITIAL = {
     "angles": "positions",
     "speeds": "slide_speeds",

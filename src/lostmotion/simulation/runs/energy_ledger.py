@@ -23,8 +23,9 @@ def ledger_of(scenario: Scenario) -> dict[str, float]:
 
 
 def largest_stored(data: Mapping[Any, Any]) -> float:
-    """Bound on the elastic energy of each gear in a run [J], output torque times twist, and at least what the largest torque does in a
-    rounding of a radian, or a force in that of a metre: shafts that friction holds may have the speed of a rounding.
+    """Bound on the elastic energy of each gear in a run [J]: output torque times twist, and at least the work of the
+    largest torque over a rounding of a radian, or of a force over a rounding of a metre: shafts that friction holds may have
+    the speed of a rounding.
     """
     torques = [np.abs(values).max() for name, values in data.items() if str(name).endswith(("torque", "force"))]
     largest = ROUNDING * float(max(torques, default=0.0))

@@ -104,7 +104,7 @@ def found_in(scenario: Scenario, result: xarray.Dataset | RunArrays) -> tuple[Lo
 
 
 def _angle(train: DriveTrain, shaft: str, result: xarray.Dataset | RunArrays) -> np.ndarray:
-    """Angle of a shaft over a run [rad], from those that the run has."""
+    """Angle of a shaft over a run [rad], from the angles that the run has."""
     return np.asarray(
         sum(factor * np.asarray(result[name]) for name, factor in angle_terms(train, shaft, result).items())
     )

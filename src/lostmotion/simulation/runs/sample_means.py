@@ -1,4 +1,4 @@
-"""Means over the samples of a run, the last of which may lie closer to the one before than the others."""
+"""Means over the samples of a run. The last sample may lie closer to the one before than the others."""
 
 import numpy as np
 

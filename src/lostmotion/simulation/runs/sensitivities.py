@@ -28,7 +28,7 @@ from .core_runs import core_case
 if TYPE_CHECKING:
     import xarray
 
-STEP = 2.0**-11  # of a value, relative: h^4 and the rounding of a difference over h are about 1e-12 of it
+STEP = 2.0**-11  # of a value, relative: h^4 and the rounding of a difference over h are about 1e-12 of the value
 STEP_AT_ZERO = 2.0**-11  # in SI units
 # Multiples of the step, and the weights of f(p + k h) - f(p), over h.
 CENTRAL = ((-2, 1 / 12), (-1, -8 / 12), (1, 8 / 12), (2, -1 / 12))
@@ -82,7 +82,7 @@ def _entry_at(scenario: Scenario, key: str) -> Any:
 
 
 def neighbours(scenario: Scenario, key: str) -> list[Neighbour]:
-    """Scenarios beside a value: on both sides of it or, at an end of its range, on one.
+    """Scenarios beside a value: on both sides of the value or, at an end of its range, on one side.
 
     Raises InputError: there are none.
     """
@@ -237,7 +237,7 @@ def _add_derived(
     derivatives: dict[str, np.ndarray],
     beside: Sequence[Sequence[Neighbour]],
 ) -> None:
-    """Adds the variables that follow from those of the solver, by differences along the derivatives of these."""
+    """Adds the variables that follow from the solver's variables, by differences along their derivatives."""
     read = dict(derivatives)
     here = _derived(scenario, data)
     for name, values in here.items():

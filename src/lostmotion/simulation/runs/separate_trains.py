@@ -16,7 +16,10 @@ from ...model.train import COUPLINGS
 from ..forms.train_tables import TrainInitial
 from ..scenario.scenario import Scenario
 
-INSTANT, LEADING = 0, 2  # of a switching: the column of its instant, and how many come before those of contacts
+INSTANT, LEADING = (
+    0,
+    2,
+)  # of a switching: the column of its instant, and the number of columns before the columns of contacts
 NO_CONTACT = 2.0
 SIDE_BY_SIDE = 1_000_000  # ticks: the longest run that another one may have beside it, which Ctrl-C does not end
 SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all elements
@@ -130,7 +133,7 @@ def control_of_part(control: BoundController, whole: Scenario, part: Scenario) -
 def joined_results(
     whole: Scenario, parts: Sequence[Scenario], results: Sequence[dict[str, Any]], most: int
 ) -> dict[str, Any]:
-    """Result of the whole train from those of its parts.
+    """Result of the whole train from the results of its parts.
 
     results: of the parts, with `channels` and `contacts`, their names.
     most: switchings that are kept.

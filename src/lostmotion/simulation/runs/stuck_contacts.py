@@ -100,7 +100,7 @@ class MotorState:
     The motor is thought to wind up slowly all that it has to turn, from the present torques of the gears. It turns
     each shaft that gears and clutches join to its own, against its load, its friction and the other motors, whose
     commands stay. Clutches slip at their capacity. A damper acts on a shaft at rest with the present speed of its
-    other shaft. Inertia is left out, torques over angles are those of the present angles. Exact in trains without
+    other shaft. Inertia is left out, and torques over angles belong to the present angles. Exact in trains without
     branches, and with them unless a self-locking gear overruns beside another (then an upper bound);
     docs/drive-trains.md says more.
     """

@@ -1,4 +1,4 @@
-"""A scenario: a drive, what acts on it and what is wanted of it, in the words of its file."""
+"""A scenario: a drive, what acts on it, and its task, in the words of its file."""
 
 from __future__ import annotations
 
@@ -41,11 +41,11 @@ from ..forms.train_checks import check_train
 from ..forms.train_tables import LINEAR_INITIAL, ShaftTable, TrainInitial, TrainTables, core_train
 from ..variables import Variable, variables_of_core
 
-LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # of which one makes a scenario one in the long form
+LONG_TABLES = ("shafts", "slides", *LinearElements.model_fields)  # keys; one of them puts a scenario into the long form
 
 
 class Scenario:
-    """Drive or drive train, what acts on it and what is wanted of it.
+    """Drive or drive train, what acts on it, and its task.
 
     It is written in one of three forms: the tables ``motor``, ``gearbox`` and ``load``; the table ``axis``; or shafts and what
     joins them. Each becomes a drive train. What is written can be read as attributes, in every form also ``shafts``, ``motors``,
@@ -164,7 +164,7 @@ class Scenario:
 
     @classmethod
     def of_any(cls, what: Drive | DriveTrain | Scenario) -> Scenario:
-        """A scenario as it is, or that of a drive or a train alone, whose times are of no use."""
+        """A scenario as it is, or the scenario of a drive or a train alone, whose times have no use."""
         if isinstance(what, Scenario):
             return what
         if isinstance(what, Drive):
@@ -197,7 +197,7 @@ class Scenario:
 
     @property
     def written(self) -> DriveTables | TrainTables:
-        """The tables as files have them, those of an axis in the long form."""
+        """The tables as files have them; an axis is in the long form."""
         return self._written()
 
     @kept
@@ -268,7 +268,7 @@ class Scenario:
     def replace(self, **changes: Any) -> Self:
         """The same scenario with changes by dotted key, such as ``**{"load.inertia": 0.1}``, checked anew.
 
-        Keys are those of its file, or of the long form.
+        Keys are keys of its file, or of the long form.
         """
         doubt_all(changes, "replace")
         data = self.written.model_dump()
@@ -391,11 +391,11 @@ class Scenario:
         return self.train().commanded()
 
     def variables(self) -> tuple[Variable, ...]:
-        """The variables that a result has, without those of controllers."""
+        """The variables of a result, without the variables of controllers."""
         return variables_of_core(self.core().variables())
 
     def derive(self, data: dict[str, Any], time: Any) -> None:
-        """Add the variables that follow from those of the solver; a channel that is not there counts as 0."""
+        """Add the variables that follow from the solver's variables; a channel that is not there counts as 0."""
         core = self.core()
         following = [v.name for v in self.variables() if v.derived]
         if following:
@@ -416,7 +416,7 @@ class Scenario:
         return {self.prefix(name): c for name, c in self.axes().items()}
 
     def sliding(self) -> dict[str, tuple[bool, bool]]:
-        """Whether the motor of a controller moves a slide, and whether its position is that of one, by the prefix of its variables."""
+        """Whether the motor of a controller moves a slide, and whether its position is the position of a slide, by the prefix of its variables."""
         train, tables = self.train(), self.tables
         return {
             self.prefix(name): (train.is_slide(train.motors[name].shaft), train.is_slide(tables.controlled(name)))
@@ -490,7 +490,7 @@ class Scenario:
 
     @kept
     def begin(self) -> TrainInitial:
-        """State at t = 0, with what the references say of it."""
+        """State at t = 0, with the values that the references give."""
         written, train, tables = self.tables.initial, self.train(), self.tables
         speeds = given_speeds(train, tables.motions())
         angles = {name: float(s.motion.at(0.0)[0]) for name, s in tables.movers().items() if s.motion is not None}

@@ -92,7 +92,7 @@ def changed(tables: dict[str, Any], path: Path) -> Scenario:
 
 
 def read_tables(path: str | Path, overrides: Mapping[str, Any] | Iterable[str] = ()) -> dict[str, Any]:
-    """The tables of a scenario file with those of its `base` and the overrides, records still as `from`."""
+    """The tables of a scenario file merged with the tables of its `base` and the overrides, records still as `from`."""
     path = find_scenario(path)
     data = _read(path, ())
     override(data, overrides, path)
@@ -118,7 +118,7 @@ def override(data: dict[str, Any], overrides: Mapping[str, Any] | Iterable[str],
 
 
 def title_with(title: str, keys: Iterable[str]) -> str:
-    """The title of a scenario of which some values were changed, so that it claims no more than holds.
+    """The title of a scenario with some values changed, which claims no more than holds.
 
     Examples
     --------

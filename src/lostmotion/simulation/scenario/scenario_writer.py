@@ -29,7 +29,7 @@ MARK = "# Tuned"
 def write_changed(
     target: Path, scenario: Scenario, source: str | Path, changes: Mapping[str, Any], notes: list[str]
 ) -> None:
-    """Write a scenario that differs from that of a file by some values.
+    """Write a scenario that differs from the scenario of a file by some values.
 
     The comments and the order of the file are kept. The written file is read again and compared with the scenario. If
     the changes cannot be made in the file, or the source is a saved result, the whole scenario is written instead.

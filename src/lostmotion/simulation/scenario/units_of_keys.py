@@ -23,7 +23,7 @@ Place = tuple[int | str, ...]  # parts of a dotted key
 def unit_of_key(key: str) -> str | None:
     """SI unit of a dotted key of a scenario; empty for a plain number, None if it is no quantity or not known.
 
-    A key of both forms (`command.frequency`, where a motor has that name) is taken as that of the short one.
+    A key of both forms (`command.frequency`, where a motor has that name) is read as the key of the short form.
     """
     of_drive = unit_in(DriveTables, key)
     return unit_in(TrainTables, key) if of_drive is None else of_drive

@@ -78,8 +78,8 @@ class SimulationAnswers(SimulationReadings):
             derivative passes through switchings. It takes the commands of controllers at sample instants within the
             interval as constant.
 
-        Raises InputError: as of `advance`; the shaft has no load torque, its angle follows from that of another shaft,
-            or a mass matrix joins it to others.
+        Raises InputError: as of `advance`; the shaft has no load torque, its angle follows from the angle of another
+            shaft, or a mass matrix joins it to others.
         Raises SolverError: as of `advance`.
 
         Examples
@@ -123,7 +123,7 @@ class SimulationAnswers(SimulationReadings):
     def restore(self, snapshot: SimulationSnapshot) -> None:
         """Return to the state of a snapshot of this simulation.
 
-        Raises InputError: the snapshot is that of another simulation.
+        Raises InputError: the snapshot belongs to another simulation.
         """
         if not isinstance(snapshot, SimulationSnapshot) or snapshot.made is not self._made:
             raise InputError(f"snapshot: {shown(snapshot)} is none of this simulation; between simulations, use state")

@@ -34,7 +34,7 @@ class JointDrive:
     drive: Scenario  # with the inertia of the load that the multibody engine has given it
     simulation: Simulation = field(repr=False)
     train: DriveTrain = field(repr=False)
-    shaft: str  # shaft whose angle is that of the joint
+    shaft: str  # shaft whose angle is the angle of the joint
     command: int | None  # place of the command among the inputs of the solver; None: a controller turns the motor
     command_scale: float  # from what `step` is given to the command
 
@@ -85,7 +85,7 @@ class JointDrive:
         return total
 
     def ratios(self) -> dict[str, float]:
-        """Speed of each shaft over that of the joint, all meshes stiff."""
+        """Speed of each shaft over the speed of the joint, all meshes stiff."""
         return {name: turns(self.train, name, self.shaft) or 0.0 for name in self.train.shafts}
 
     def own_torque(self, angle: float) -> float:
@@ -100,7 +100,7 @@ class JointDrive:
     def twists_under(self, torque: float) -> tuple[dict[str, float], dict[str, float]]:
         """By gear: the twists [rad] under a torque [N·m] on the joint, and the hysteresis capacities [N·m] that such a torque leaves.
 
-        Gears hand the torque on without losses: at rest these leave open how much of it each carries.
+        Gears hand the torque on without losses: at rest the share that each of them carries is not determined.
 
         Raises InputError: the train is no chain of gears.
         """
@@ -127,7 +127,7 @@ def joint_drive(name: str, drive: Driven, inertia: float, step: float, *, slides
     slides: whether the joint moves along a line.
 
     Raises InputError: it is not clear which shaft the joint is, or the joint turns and the shaft slides, or the other way; another
-        inertia than that of the robot moves with it; an element needs a command that `step` does not give.
+        inertia than the robot's moves with it; an element needs a command that `step` does not give.
     """
     scenario = Scenario.of_any(drive)
     train = scenario.train()

@@ -292,16 +292,18 @@ class Simulation(SimulationAnswers):
             Where there is one command or reference, and one load torque: one value, held over the interval, or a pair of values,
             between which it runs in a straight line.
         motion
-            By the name of each shaft whose motion is given a dictionary: its ``speed`` [rad/s] at the end of the interval, and if wanted its ``angle``
-            [rad], of a slide its ``position`` [m], and ``acceleration`` [rad/s²] there. On the way from the present values the acceleration is constant; with more
-            than a speed it runs in up to three straight lines, so that the end is met. The torque that this takes is the
-            variable ``<shaft>_drive_torque``, of a slide ``<slide>_drive_force``.
+            By the name of each shaft whose motion is given a dictionary: its ``speed`` [rad/s] at the end of the interval,
+            and if wanted its ``angle`` [rad], of a slide its ``position`` [m], and ``acceleration`` [rad/s²] there. On the
+            way from the present values the acceleration is constant; with more than a speed it runs in up to three straight
+            lines, so that the end is met. The torque that this takes is the variable ``<shaft>_drive_torque``, of a slide
+            ``<slide>_drive_force``.
         mass_matrix
             By the name of a mass matrix of the train its rows [kg·m²] from now on, also in the steps that follow. The speeds stay
             as they are; what the change of the inertia does to the motion is to be given as load torques.
         inputs
-            The same by the names in `inputs`, among them the references of continuous controllers, such as ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All
-            commands are to be given; a load torque that is left out is 0.
+            The same by the names in `inputs`, among them the references of continuous controllers, such as
+            ``servo_command=0.2`` and ``table_load_torque=(0.0, 5.0)``. All commands are to be given; a load torque that is
+            left out is 0.
 
         Raises
         ------
@@ -350,7 +352,7 @@ class Simulation(SimulationAnswers):
             raise
 
     def _step_with_motions(self, interval: Any, begin: list[float], end: list[float], motion: Any) -> None:
-        """In parts, in each of which all accelerations are straight lines; in one part if no motion is given."""
+        """In parts, such that all accelerations are straight lines in each part; in one part if no motion is given."""
         if not motion and not self._motions:
             self._step(interval, begin, end)
             return

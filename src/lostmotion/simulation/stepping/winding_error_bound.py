@@ -40,7 +40,7 @@ class StepBound:
 
     @property
     def state(self) -> State:
-        """The whole of it."""
+        """The whole bound."""
         return self.coarse.state, dict(self._largest), dict(self._apart)
 
     @state.setter

@@ -83,7 +83,7 @@ class AxisTask(Task, Duty):
     max_cycles: Annotated[Whole, Field(ge=FEWEST, le=1000)] = 4
     """largest number of cycles to run, until two of them agree within 1 %"""
     max_inertia_ratio: Annotated[Number, Positive] | None = None
-    """largest inertia of load, stage and gearbox at the motor relative to the rotor; left out, that of the motor's manufacturer, or else 10"""
+    """largest inertia of load, stage and gearbox at the motor relative to the rotor; left out, the limit of the motor's manufacturer, or else 10"""
     max_tracking_error: Annotated[Angle, Positive] | None = None  #: largest tracking error of the load over the cycle
     max_reversal_error: Annotated[Angle, Positive] | None = None
     """largest reversal error of the load: mean position at rest after motion in one direction, minus that after the other"""
@@ -235,7 +235,7 @@ def turns_back(reference: PositionReference) -> bool:
 
 
 def _up_to(motor: Motor, current: float) -> Motor:
-    """A motor whose largest current is that of its amplifier [A], if its own is not less."""
+    """A motor whose largest current is limited to the current of its amplifier [A], if its own is not less."""
     if motor.winding is not None:
         own = motor.winding.max_current or math.inf
         limit = {"max_current_rms": min(own, current), "max_current_peak": None}

@@ -26,7 +26,7 @@ from .axis_task import AxisTask, reference_of, repeated, repeated_torque
 
 
 def load_torque_of(base: Scenario, task: AxisTask) -> TorqueSignal:
-    """The load torque of one cycle: that of the base, with what the duty of the task adds along the reference."""
+    """The load torque of one cycle: the load of the base, with the duty of the task along the reference added."""
     if not task.anything:
         return base.load.torque
     duty = Duty(gravity=task.gravity, payload=task.payload, process=task.process)
@@ -156,7 +156,7 @@ def with_scale_alone(base: Scenario) -> Scenario:
 
 
 def current_loop(controller: Controller, wanted: AnyCurrent | None, motor: Motor) -> AnyCurrent:
-    """The current loop of a task for a motor: of a torque source, whose winding is not known, a lag as long as that of a sampled loop.
+    """The current loop of a task for a motor: of a torque source, whose winding is not known, a lag as long as the lag of a sampled loop.
 
     A closed loop g/(z (z - 1)) lags by T/g at low frequency, the delay of its output included.
     """
@@ -178,7 +178,7 @@ def _with_loop(controller: Controller, loop: AnyCurrent) -> tuple[Controller, fl
 
 def tuned(base: Scenario, motor: Motor, g: Gearbox, current: AnyCurrent | None = None) -> Controller:
     """Controller of the base with gains by rule for a motor, a gearbox and its load. The torque of their inertia is
-    fed forward. `current` is its current loop, if not that of the base."""
+    fed forward. `current` is its current loop, if not the base's."""
     assert base.controller is not None
     controller, lag = _with_loop(base.controller, current_loop(base.controller, current, motor))
     assert controller.position is not None

@@ -1,7 +1,7 @@
 """Expressions of the result variables that a study stores of each run, read by a grammar of their own.
 
 An expression is parsed, and each of its parts turned into an entry of the tables of `study_functions`; a part that is none of
-the listed ones is refused. Nothing of it is ever run as Python.
+the listed ones is refused. The text is never run as Python.
 """
 
 from __future__ import annotations

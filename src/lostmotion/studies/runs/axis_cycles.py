@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from ..study.study import Study
 
 VARIABLES = ("command", "motor_torque", "motor_speed", "output_torque", "load_angle", "load_speed", "twist")
-"""of which the columns of a task are made"""
+"""from which the columns of a task are made"""
 
 
 def until_it_repeats(study: Study, row: np.ndarray) -> Repeated:
@@ -50,7 +50,7 @@ def until_it_repeats(study: Study, row: np.ndarray) -> Repeated:
 
 
 def _run(scenario: Scenario, shorter: Cycles, longer: Cycles) -> RunArrays:
-    """Run of the shorter cycles if the last two of them agree, else of the longer ones, which are those of the scenario."""
+    """Run of the shorter cycles if their last two agree, else of the longer ones, which the scenario has."""
     samples = shorter.simulation.samples
     check_memory(len(longer.time), BYTES_PER_VALUE * len(VARIABLES))
     values = np.empty((len(VARIABLES), len(longer.time)))

@@ -202,7 +202,7 @@ class Axes:
         return self._under_task(found, motor)
 
     def _lost_motion(self, row: np.ndarray, demand: InputDemand, motor: Motor, limit: float) -> Finding:
-        """Lost motion under a share of the rated torque: that of the gearbox, or without one that of the motor."""
+        """Lost motion under a share of the rated torque: the gearbox's, or without one the motor's."""
         stage, whole = self.stage(row), demand.whole
         if stage is not None and demand.gearbox == DIRECT:
             whole = together(DIRECT.model_copy(update={"rated_output_torque": motor.rated_torque}), stage[0])
@@ -243,7 +243,7 @@ class Axes:
         return known | {"inertia_ratio": ratio}
 
     def _chosen(self, row: np.ndarray, findings: list[Finding]) -> tuple[list[Finding], list[str]]:
-        """Findings with those of the limits of the choice, and what the records lack for limits and objectives."""
+        """Findings with the findings on the limits of the choice, and the data that the records lack for limits and objectives."""
         task, select = self.task, self.study.select
         found, lacking = list(findings), []
         named = () if select is None else select.named()
@@ -329,7 +329,7 @@ class Axes:
         return f"not decided: {least} with the least losses of its kind, {most} with the largest"
 
     def _with_known_losses(self, row: np.ndarray, factor: float) -> Axes:
-        """The task with a gearbox whose losses are known: so many times those of its estimate."""
+        """The task with a gearbox whose losses are known: so many times its estimate."""
         key = self.study.part_key("gearbox", row)
 
         def make() -> Axes:
@@ -406,7 +406,7 @@ class Axes:
         return self._with_others(row, of_motor, made)
 
     def _with_others(self, row: np.ndarray, of_motor: list[Finding], made: Repeated) -> list[Finding]:
-        """Findings of the motor in a run with those of its gearbox, and with those that only the required motion has."""
+        """Findings of the motor in a run, with the findings of its gearbox, and the findings that only the required motion has."""
         g, duty = made.scenario.gearbox, made.duty
         of_gearbox: list[Finding] = []
         if self.task.linear is None:

@@ -62,7 +62,7 @@ def _units(text: str) -> dict[str, str]:
 
 
 def run_piece(study: Study, first: int, last: int, threads: int) -> Runs:
-    """Simulates the runs; nearly all the time goes here, most of it with the GIL released."""
+    """Simulates the runs; nearly all the time is spent here, mostly with the GIL released."""
     parameters = study.parameters(first, last)
     if study.axis is not None:
         return run_axes(study, parameters, threads)

@@ -9,8 +9,8 @@ import numpy as np
 
 class Runs(SimpleNamespace):
     """Results of a chunk: parameters (runs x parameters), samples (variable -> runs x samples) or their reductions by
-    the core (column -> runs), energy (entry -> runs). Further columns are those of the drive check, switchings
-    and errors."""
+    the core (column -> runs), energy (entry -> runs). Further columns are columns of the drive check, switchings and
+    errors."""
 
     parameters: np.ndarray
     samples: dict[str, np.ndarray]

@@ -14,7 +14,7 @@ from ..study.study import Study
 
 CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
 
-PAIRS = 40  # of a task in a part: they take a second each, and an interruption loses those of a part that is not whole
+PAIRS = 40  # of a task in a part: they take a second each, and an interruption loses the runs of an unfinished part
 
 STRAY = "is no part of this study"
 FOREIGN = "belongs to another study"
@@ -60,7 +60,7 @@ def checksums(directory: Path) -> dict[str, str]:
 
 
 def forget_missing(directory: Path) -> None:
-    """Rewrite the checksums with those of parts that are there."""
+    """Rewrite the list of checksums, with the parts that are there alone."""
     kept = {name: sum_ for name, sum_ in checksums(directory).items() if (directory / name).is_file()}
     write_bytes(directory / CHECKSUMS, "".join(f"{kept[name]}  {name}\n" for name in sorted(kept)).encode())
 

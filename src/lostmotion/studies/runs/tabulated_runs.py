@@ -24,7 +24,7 @@ if TYPE_CHECKING:
 
 
 def tabulate(study: Study, units: dict[str, str], first: int, last: int, runs: Runs, threads: int) -> pa.Table:
-    """One row a run: its number, its parameters, what is kept of it, its error if it has one."""
+    """One row a run: its number, its parameters, the kept values, and its error if it has one."""
     import pyarrow as pa
 
     columns: dict[str, Any] = {"run": pa.array(np.arange(first, last))}

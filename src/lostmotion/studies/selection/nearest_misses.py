@@ -34,7 +34,7 @@ class Miss:
     """A candidate that does not fit, with what it lacks."""
 
     candidate: RankedCandidate
-    lacks: dict[str, float]  # by rule or column: by how much its limit is exceeded, as a share of it
+    lacks: dict[str, float]  # by rule or column: by how much its limit is exceeded, as a share of the limit
     slower: float | None
     """a cycle so many times as long passes the rules, by evaluation; None: none up to `SLOWEST` does, or it was not tried"""
     then: str = ""  # result of the rules and the run for that cycle
@@ -133,7 +133,7 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 
 
 def _tried(study: Study, miss: Miss) -> Miss:
-    """With the least factor by which the cycle has to be longer, if there is one, and what rules and run say of it."""
+    """With the least factor by which the cycle has to be longer, if there is one, and the findings of rules and run with it."""
     if same := dict.fromkeys("its parts" if limit in CHOICE else limit for limit in miss.lacks if limit in AT_ANY_TIME):
         return replace(miss, then=f"a slower cycle does not change {', '.join(same)}")
     try:

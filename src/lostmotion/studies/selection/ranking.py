@@ -42,7 +42,7 @@ class RankedCandidate:
     missing: tuple[str, ...] = ()
     """rules of a task that are not judged, each with the datum that is missing, or what its records lack for a run"""
     over: dict[str, float] = field(default_factory=dict)
-    """by limit: by how much it is exceeded, as a share of it, where that is a number"""
+    """by limit: by how much it is exceeded, as a share of the limit, where that is a number"""
 
     @property
     def fits(self) -> bool:
@@ -64,11 +64,11 @@ class Price:
     alone: int  # runs that violate it and nothing else
     best: RankedCandidate | None  # the best that would fit without it
     opens: float
-    """by how much, as a share of it, the limit would have to be relaxed so that one more candidate fits; NaN where it is not known"""
+    """by how much, as a share of the limit, the limit would have to be relaxed so that one more candidate fits; NaN where it is not known"""
     gain: float
     """by how much the first objective would then be better, as a share of its value now; NaN where there is no such value"""
     rests: float = math.nan
-    """least distance of a resting load beyond the settling window, as a share of it; NaN if a load settles"""
+    """least distance of a resting load beyond the settling window, as a share of the window; NaN if a load settles"""
 
 
 def candidates(table: pa.Table, study: Study) -> list[RankedCandidate]:
@@ -191,7 +191,7 @@ def prices(ranked: list[RankedCandidate], select: Selection) -> list[Price]:
 
 
 def pareto_front(ranked: list[RankedCandidate], select: Selection) -> list[RankedCandidate]:
-    """Runs that fit and of which none that fits is better in one objective without being worse in another."""
+    """Runs that fit, such that no other fitting run is better in one objective without being worse in another."""
     fitting = [c for c in ranked if c.fits]
     ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), len(select.objectives))
     return [c for c, rank in zip(fitting, ranks, strict=True) if not _dominated(rank, ranks)]

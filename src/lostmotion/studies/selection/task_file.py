@@ -68,9 +68,9 @@ POSITION = {"sample_time": 1e-3, "feedforward": 1.0}
 def load_task(path: str | Path) -> Study:
     """Read a task file.
 
-    Its tables are those of a scenario: `[load]`, `[controller]` with its reference but without gains, `[motor]` and
+    It has the tables of a scenario: `[load]`, `[controller]` with its reference but without gains, `[motor]` and
     `[gearbox]` with keys beside a record. Further tables are `[task]` (`AxisTask`), and `[candidates]` or `[[vary]]`
-    and `[select]` of a study. Without the former, motors and gearboxes are those of the whole catalogue.
+    and `[select]` of a study. Without the former, motors and gearboxes are taken from the whole catalogue.
 
     Parameters
     ----------
@@ -304,9 +304,9 @@ def _varied(tables: dict[str, Any], kind: str) -> bool:
 
 
 def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables of a linear task as those of a rotary one with the same numbers: kg for kg m², m for rad, N for N m.
+    """The tables of a linear task as the tables of a rotary one with the same numbers: kg for kg m², m for rad, N for N m.
 
-    The equations of a slide behind a screw are those of a load behind a gear of the ratio 2 pi/lead.
+    The equations of a slide behind a screw equal the equations of a load behind a gear of the ratio 2 pi/lead.
 
     Raises InputError: a value has the unit of something else.
     """
@@ -376,7 +376,7 @@ def _table(tables: dict[str, Any], key: str) -> dict[str, Any]:
 
 
 def _controller(given: dict[str, Any]) -> dict[str, Any]:
-    """A controller of which the rule gives the gains."""
+    """A controller whose gains the rule gives."""
     for loop, gains in (("position", ("gain",)), ("speed", ("gain", "integral_gain", "integral_time"))):
         for key in gains:
             if isinstance(given.get(loop), dict) and key in given[loop]:

@@ -32,7 +32,7 @@ def check_columns(scenario: Scenario) -> dict[str, float | str]:
 
 
 def columns_of(findings: Iterable[Finding], columns: Mapping[str, float | str] = COLUMNS) -> dict[str, float | str]:
-    """Findings as columns; of those of one rule the one that uses most of its limit."""
+    """Findings as columns; of findings of one rule, the one that uses most of its limit."""
     row, findings = dict(columns), list(findings)
     for finding in findings:
         column = f"{USE}{finding.rule}"

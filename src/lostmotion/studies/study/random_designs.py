@@ -1,4 +1,4 @@
-"""Random and quasi-random designs of studies: points of the unit cube, any part of which can be made by itself."""
+"""Random and quasi-random designs of studies: points of the unit cube; any part can be made by itself."""
 
 from __future__ import annotations
 

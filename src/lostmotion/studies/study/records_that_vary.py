@@ -149,8 +149,8 @@ def names_of(table: str, given: Any, directory: Path = Path()) -> list[str]:
     """The names of all records that a list gives: names, files and directories of data sheets, and filters of the catalogue.
 
     table: the kind of records, such as ``"gearbox"``.
-    given: one of these, or a list: the name of a record; a file (``.toml``) or a directory of such files, of which all
-        records of the kind are taken; a filter as `names_that_fit` takes it. What is named twice is taken once.
+    given: one of these, or a list: the name of a record; a file (``.toml``) or a directory of such files; all records
+        of the kind are taken; a filter as `names_that_fit` takes it. What is named twice is taken once.
     directory: files and directories are relative to it.
 
     Raises ValueError: there is no such file or record, or nothing fits.

@@ -13,7 +13,7 @@ from .vary import Vary, scaled
 
 
 def is_stepper(table: Mapping[str, Any]) -> bool:
-    """Whether a table `[motor]`, with or without a record, is that of a stepper."""
+    """Whether a table `[motor]`, with or without a record, belongs to a stepper."""
     if "from" not in table:
         return bool(table.get("kind") == "stepper")
     return find(str(table["from"]), "motor").kind == "stepper" and table.get("kind", "stepper") == "stepper"

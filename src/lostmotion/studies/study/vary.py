@@ -204,7 +204,7 @@ def _may_be_left_out(scenario: Scenario, key: str) -> bool:
 
 
 def with_keys_of_tables(scenario: Scenario, entries: Any, of_task: bool) -> Any:
-    """Entries of `vary` whose keys are those of the tables of the scenario; columns keep the names that were written."""
+    """Entries of `vary` whose keys are keys of the scenario's tables; columns keep the names that were written."""
     if of_task or not isinstance(entries, list | tuple):
         return entries
     out = []
