@@ -11,6 +11,7 @@ from figure_files import save
 import lostmotion as lm
 from lostmotion.reports.looks import FIRST, MUTED, SECOND
 from lostmotion.reports.panels import Curve, Panel
+from lostmotion.simulation.forms.key_aliases import DRIVE
 
 MRAD = 1e3
 OPPOSITE: dict[str, Any] = {"color": MUTED, "linestyle": "--"}
@@ -65,7 +66,7 @@ def maps(out: Path, scenario: lm.Scenario) -> None:
 def write(out: Path) -> None:
     """All figures of the page, into a directory."""
     scenario = lm.load("hunting-with-static-friction")
-    assert not scenario.is_drive
+    assert scenario.form != DRIVE
     run(out, scenario)
     certificates(out, scenario)
     maps(out, scenario)

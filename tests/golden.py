@@ -27,6 +27,7 @@ import pyarrow.parquet as pq
 
 import lostmotion as lm
 from chains import chain
+from lostmotion.simulation.forms.key_aliases import DRIVE
 
 ROOT = Path(__file__).parent.parent
 FILE = Path(__file__).with_name("golden.toml")
@@ -60,7 +61,7 @@ def compute() -> Groups:
     for path in sorted((ROOT / "scenarios").glob("*.toml")):
         scenario, name = lm.load(path), path.stem
         groups |= {f"{name}.{what}": values for what, values in of_run(scenario).items()}
-        if not scenario.is_drive or scenario.controller is not None:
+        if scenario.form != DRIVE or scenario.controller is not None:
             continue
         s = scenario.command
         if not (s.steps or s.ramps or scenario.load.torque.ramps):
@@ -89,7 +90,7 @@ def of_run(scenario: lm.Scenario) -> Groups:
         "end_state": json.loads(result.attrs["end_state"]),
         "energy": lm.energy_of(result),
     }
-    gears = scenario.gears.values() if not scenario.is_drive else (scenario.gearbox,)
+    gears = scenario.gears.values() if scenario.form != DRIVE else (scenario.gearbox,)
     for gear in gears:
         if isinstance(gear.losses, lm.model.LossMap):  # not of the core; where it differs, all else does
             groups["input"] = {"loss_map": np.ravel(gear.losses.values)}

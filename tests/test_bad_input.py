@@ -17,6 +17,7 @@ from conftest import ROOT, lostmotion
 from lostmotion.inputs.validation import listed, nearest
 from lostmotion.simulation.scenario.scenario import Scenario
 from lostmotion.studies.expressions.expressions import Expression
+from lostmotion.studies.expressions.vocabulary import vocabulary_of
 from refusals import assert_file_refused, assert_plain, refused, refuses
 
 GOOD = """
@@ -352,7 +353,7 @@ def test_long_lists_in_messages_are_cut(tmp_path: Path) -> None:
         assert len(refused(lambda: lm.load(path)).removeprefix(str(path))) <= 290, wrong
     for wrong in ("x", "peak(x)", "load_speed.foo()", "energy.none", "peak(load_speed" + " + 1" * 400):
         with pytest.raises(ValueError, match=r"^.") as caught:
-            Expression(wrong)
+            Expression(wrong, vocabulary_of(lm.load("paper-2dof-nl-small")))
         assert len(str(caught.value)) <= 290
 
 

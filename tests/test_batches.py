@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.simulation.variables import STATES
+from lostmotion import _core
 
 STEP = 1e-3
 
@@ -63,10 +63,10 @@ def random_commands(generator: np.random.Generator, steps: int, count: int) -> n
 
 def run(batch: lm.SimulationBatch, commands: np.ndarray, loads: np.ndarray | None = None) -> np.ndarray:
     """States after each step: steps x states x drives."""
-    out = np.empty((len(commands), len(STATES), len(batch)))
+    out = np.empty((len(commands), len(_core.states()), len(batch)))
     for k, command in enumerate(commands):
         batch.step(command, 0.0 if loads is None else loads[k])
-        out[k] = [batch[name] for name in STATES]
+        out[k] = [batch[name] for name in _core.states()]
     return out
 
 
@@ -88,7 +88,7 @@ def test_a_batch_moves_as_its_drives_alone(seed: int) -> None:
                 for name in ("motor_speed", "load_speed", "twist", "load_angle"):
                     # Rounding grows where flanks bounce; the figures of the benchmark are smaller by far.
                     scale = {"motor_speed": 1e-5, "load_speed": 1e-6, "twist": 1e-9, "load_angle": 1e-8}[name]
-                    assert states[n, STATES.index(name), k] == pytest.approx(alone[name], abs=scale, rel=0.0)
+                    assert states[n, _core.states().index(name), k] == pytest.approx(alone[name], abs=scale, rel=0.0)
         # Between two modes an event at the end of a step may fall on either side of it.
         assert batch["output_torque"][k] == pytest.approx(alone["output_torque"], abs=1e-4)
         assert batch["motor_torque"][k] == pytest.approx(alone["motor_torque"], abs=1e-6)
@@ -189,7 +189,7 @@ def test_reset_takes_back_those_that_are_meant() -> None:
     which = np.arange(12) % 3 == 0
     batch.reset(which)
     assert np.array_equal(batch.time, np.where(which, 0.0, batch.time.max()))
-    assert np.array_equal(batch["load_angle"], np.where(which, 0.0, first[-1, STATES.index("load_angle")]))
+    assert np.array_equal(batch["load_angle"], np.where(which, 0.0, first[-1, _core.states().index("load_angle")]))
     again = run(batch, commands)
     assert np.array_equal(again[:, :, which], first[:, :, which])
     batch.reset(initial={"load_angle": 0.3, "motor_speed": np.full(12, 2.0)})
@@ -219,7 +219,7 @@ def test_a_seed_draws_the_same_drives() -> None:
     commands = np.full((50, 5), 0.2)
     first = run(batch(1), commands)
     assert np.array_equal(run(batch(1), commands), first)
-    assert len(np.unique(first[-1, STATES.index("load_angle")])) == 5
+    assert len(np.unique(first[-1, _core.states().index("load_angle")])) == 5
     assert not np.array_equal(run(batch(2), commands), first)
 
 

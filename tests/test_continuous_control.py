@@ -19,6 +19,7 @@ from scipy.optimize import brentq
 
 import lostmotion as lm
 from conftest import some
+from lostmotion.simulation.forms.key_aliases import DRIVE
 
 J = 1.0  # kg m2
 PID = {"gain": 4.0, "integral_gain": 1.5, "derivative_gain": 0.8}
@@ -495,7 +496,7 @@ def test_in_the_short_form_it_makes_a_train_of_the_drive(tmp_path: Path) -> None
     path = tmp_path / "short.toml"
     path.write_text(SHORT)
     short, drive = lm.load(path, ["controller.position.gain=30"]), lm.load("paper-2dof-nl-small")
-    assert not short.is_drive
+    assert short.form != DRIVE
     controller = tomllib.loads(SHORT)["controller"]
     controller["position"]["gain"] = 30.0
     controller["shaft"] = "load"

@@ -17,6 +17,7 @@ from lostmotion.data_sheets.records import find
 from lostmotion.paper import paper_scenario
 from lostmotion.reports.drive_check import check_report
 from lostmotion.reports.page import render
+from lostmotion.simulation.forms.key_aliases import DRIVE
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
 from lostmotion.sizing.finding import RULES, Finding
@@ -514,7 +515,7 @@ def test_the_force_of_a_linear_motor_is_judged_by_its_peak_and_its_rated_force()
 @pytest.mark.parametrize("name", ["position-axis", "catalogue-robot-joint", "paper-1dof-l-small", "lossy-rigid-gear"])
 def test_a_drive_in_the_long_form_gets_the_judgements_of_the_short_one(name: str) -> None:
     scenario = lm.load(name)
-    assert scenario.is_drive
+    assert scenario.form == DRIVE
     short, long = (
         [(f.rule, f.value, f.verdict) for f in lm.check_drive(s) if f.rule in ("inertia_ratio", "resonance", "lost_motion")]
         for s in (scenario, scenario.long())

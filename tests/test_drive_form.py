@@ -12,6 +12,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.simulation.forms.axis_form import file_schema
+from lostmotion.simulation.forms.key_aliases import DRIVE
 
 MOVES = {"moves": [{"to": "90 deg"}], "speed": "3 rad/s", "acceleration": "20 rad/s^2", "jerk": "800 rad/s^3"}
 FLANKS = {"kind": "rigid", "backlash": "2 mrad", "restitution": 0.4}
@@ -98,7 +99,7 @@ def test_bad_input_is_refused_with_the_keys_of_the_short_form(tables: dict[str, 
 def test_a_rigid_gear_without_backlash_stays_in_the_short_form() -> None:
     """Also with the values that are left out, as a scenario's own tables have them."""
     scenario = lm.Scenario.model_validate(short(stiffness={"kind": "rigid"}))
-    assert scenario.is_drive
+    assert scenario.form == DRIVE
     assert lm.Scenario.model_validate(scenario.model_dump()) == scenario
 
 
@@ -108,7 +109,7 @@ def test_the_constructor_reads_what_files_have() -> None:
     assert moved.train() == long().train()
     flanks = lm.Scenario(**short(stiffness=FLANKS))
     assert list(flanks.gears) == ["gearbox"]
-    assert not flanks.is_drive
+    assert flanks.form != DRIVE
 
 
 AXIS = """

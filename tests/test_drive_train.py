@@ -18,6 +18,7 @@ from conftest import SCENARIOS, TRAINS
 from lostmotion.inputs.validation import shown
 from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.initial_state import start_values
+from lostmotion.simulation.forms.key_aliases import DRIVE
 from lostmotion.simulation.forms.train_tables import TrainTables, train_schema
 from refusals import refuses
 
@@ -74,7 +75,7 @@ def file(tmp_path: Path) -> Path:
 
 def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
     scenario = lm.load(file)
-    assert not scenario.is_drive
+    assert scenario.form != DRIVE
     assert scenario == train()
     assert scenario.shafts["worm"].inertia == pytest.approx(1e-4, rel=1e-14)
     assert list(scenario.train().gears) == ["belt", "worm"]
@@ -311,7 +312,7 @@ def test_a_drive_is_a_train_of_two_shafts(path: Path) -> None:
 @pytest.mark.parametrize("path", TRAINS, ids=lambda p: p.stem)
 def test_shipped_trains_load_and_survive_json(path: Path) -> None:
     scenario = lm.load(path)
-    assert not scenario.is_drive
+    assert scenario.form != DRIVE
     assert lm.Scenario.from_json(scenario.to_json()) == scenario
     assert lm.load(path.stem) == scenario
 

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.simulation.forms.key_aliases import DRIVE
 from test_fmu import pytestmark
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
@@ -223,7 +224,7 @@ def test_directional_derivatives_of_what_a_contact_at_rest_shares(name: str, tmp
         scenario = scenario.replace(**{"command": 6.0, "load.torque": 10.0})
     lm.export_fmu(scenario, tmp_path / "x.fmu")
     model = Model(tmp_path / "x.fmu", tmp_path / "open")
-    drive = scenario.is_drive
+    drive = scenario.form == DRIVE
     outputs = ["input_torque", "loss_coefficient"] if drive else ["worm_gear_input_torque", "worm_contact_torque"]
     contact = "input_contact" if drive else "worm_contact"
     references = [model.reference[o] for o in outputs]

@@ -17,6 +17,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.portable import fmu as exporting
+from lostmotion.simulation.forms.key_aliases import DRIVE
 
 BUILT = Path(os.environ.get("LOSTMOTION_FMU_LIBRARIES", ROOT / "src" / "lostmotion" / "fmu_libraries"))
 WINE = shutil.which("wine64", path=f"{os.environ['PATH']}:/usr/lib/wine")
@@ -73,7 +74,7 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path) 
     driver = built_driver(platform, tmp_path)
     for name in lm.shipped_scenarios():
         scenario = lm.load(name)
-        if not scenario.is_drive and scenario.given():
+        if scenario.form != DRIVE and scenario.given():
             continue  # whose steps are those of Co-Simulation alone
         path = tmp_path / f"{name}.fmu"
         lm.export_fmu(scenario, path, libraries=BUILT)

@@ -32,6 +32,7 @@ from lostmotion.identification.verdicts.identifiability import Undetermined
 from lostmotion.reports import plots
 from lostmotion.reports.identification import correlations, friction_curve, friction_curves, loop_curves, loss_curves, write_identification
 from lostmotion.reports.panels import Matrix
+from lostmotion.simulation.forms.key_aliases import DRIVE
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +73,7 @@ def test_the_answer_is_a_scenario_and_a_data_sheet(found: IdentificationResult, 
     path = tmp_path / "identified.toml"
     path.write_text(found.scenario_text())
     again = lm.load(path)
-    assert not again.is_drive
+    assert again.form != DRIVE
     assert again.motors["servo"].rotor_inertia == pytest.approx(found.values["armature"], rel=1e-12)
     sheet = tmp_path / "gearbox.toml"
     sheet.write_text(found.record_text())

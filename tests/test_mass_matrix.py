@@ -13,6 +13,7 @@ from scipy.linalg import expm
 
 import lostmotion as lm
 from conftest import some
+from lostmotion.simulation.forms.key_aliases import DRIVE
 from refusals import refuses
 
 SCENARIOS = sorted(Path(__file__).parent.parent.glob("scenarios/*.toml"))
@@ -61,14 +62,14 @@ def with_diagonals(s: lm.Scenario) -> lm.Scenario:
     return lm.Scenario(**data)
 
 
-LONG = [path for path in SCENARIOS if not lm.load(path).is_drive and not lm.load(path).mass_matrices]
+LONG = [path for path in SCENARIOS if lm.load(path).form != DRIVE and not lm.load(path).mass_matrices]
 """without a mass matrix of their own"""
 
 
 @pytest.mark.parametrize("path", LONG, ids=lambda path: path.stem)
 def test_a_diagonal_matrix_has_the_bits_of_uncoupled_shafts(path: Path) -> None:
     s = lm.load(path)
-    if not s.is_drive and any(c.inverse_model is not None for c in s.axes().values()):
+    if s.form != DRIVE and any(c.inverse_model is not None for c in s.axes().values()):
         pytest.skip("the law computes with its own model")
     plain, matrix = lm.simulate(s), lm.simulate(with_diagonals(s))  # type: ignore[arg-type]
     assert list(plain) == list(matrix)
@@ -380,7 +381,7 @@ def test_a_step_with_no_mass_matrix_is_refused_and_changes_nothing(matrix: Any, 
 
 def test_rules_that_take_one_inertia_alone_refuse_a_coupled_shaft() -> None:
     s = lm.load("position-axis-with-belt")
-    assert not s.is_drive
+    assert s.form != DRIVE
     data = s.model_dump()
     last = list(data["shafts"])[-1]
     inertia, data["shafts"][last]["inertia"] = data["shafts"][last]["inertia"], 0.0

@@ -12,12 +12,12 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from html_pages import charts
+from lostmotion import _core
 from lostmotion.cli import app
 from lostmotion.cli.grids import parse_grid
 from lostmotion.paper import paper_scenario
 from lostmotion.response.rigid import rigid_constants
 from lostmotion.response.shooting import PERIODICITY
-from lostmotion.simulation.variables import STATES
 
 NONLINEAR = paper_scenario("2-DOF-NL", "large").drive()
 
@@ -134,13 +134,13 @@ def test_linearisation_holds_where_the_input_sticks():
     model = lm.linearize(NONLINEAR, start, command=0.4)
     run = lm.simulate(NONLINEAR, command=0.4, initial=start, duration=2e-4, sample_interval=2e-4)
     assert lm.switchings_of(run).sizes["switching"] == 0
-    n = len(STATES)
+    n = len(_core.states())
     whole = np.zeros((n + 1, n + 1))
     whole[:n, :n] = model.A
     whole[:n, n] = model.B[:, 0] * 0.4 + model.rate
-    x0 = np.array([getattr(start, s) for s in STATES] + [1.0])
+    x0 = np.array([getattr(start, s) for s in _core.states()] + [1.0])
     end = scipy.linalg.expm(whole * 2e-4) @ x0
-    for k, name in enumerate(STATES):
+    for k, name in enumerate(_core.states()):
         assert float(run[name][-1]) == pytest.approx(end[k], rel=1e-11, abs=1e-14)
 
 
@@ -208,8 +208,8 @@ def test_the_jacobian_agrees_with_finite_differences_of_the_return_map(amplitude
     command = lm.CommandSignal(amplitude=amplitude, frequency=frequency)
     motion = lm.periodic_motion(NONLINEAR, command)
     assert motion.attrs["smooth"]
-    names = [*STATES[:4], "hysteresis_capacity"]
-    start = {name: motion.attrs[f"start_{name}"] for name in (*STATES, "hysteresis_capacity")}
+    names = [*_core.states()[:4], "hysteresis_capacity"]
+    start = {name: motion.attrs[f"start_{name}"] for name in (*_core.states(), "hysteresis_capacity")}
 
     def after_one_period(changed: dict[str, float]) -> np.ndarray:
         run = lm.simulate(
@@ -224,7 +224,7 @@ def test_the_jacobian_agrees_with_finite_differences_of_the_return_map(amplitude
         return np.array([end[name] for name in names])
 
     assert np.allclose(after_one_period({}), [start[n] for n in names], rtol=1e-9, atol=1e-13)
-    sizes = {name: float(abs(motion[name]).max()) for name in STATES[:4]} | {"hysteresis_capacity": 1.0}
+    sizes = {name: float(abs(motion[name]).max()) for name in _core.states()[:4]} | {"hysteresis_capacity": 1.0}
     scale = np.array([sizes[n] for n in names])
     for name in names:
         if name == "motor_speed" and start[name] == 0.0:
@@ -278,7 +278,7 @@ def test_coexisting_motions_and_subharmonics_of_a_load_in_backlash():
     assert any(round(m.attrs["period"] * 20.0) == 1 for m in found)
     # The transient from a tall motion stays with it.
     m = tall[0]
-    start = {name: m.attrs[f"start_{name}"] for name in STATES}
+    start = {name: m.attrs[f"start_{name}"] for name in _core.states()}
     run = lm.simulate(
         drive, load_torque=torque, duration=30 * m.attrs["period"], sample_interval=m.attrs["period"] / 64, initial=lm.Initial(**start)
     )

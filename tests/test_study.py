@@ -26,7 +26,7 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.paper import paper_scenario
 from lostmotion.reports.study import best_runs, influence, read_table, sobol_indices, write_study
-from lostmotion.simulation.variables import CHANNEL_NAMES
+from lostmotion.simulation.variables import VARIABLES
 from lostmotion.studies.expressions.expressions import FUNCTIONS, REDUCTIONS
 from lostmotion.studies.runs import chunk as study_chunk
 from lostmotion.studies.runs.chunk import pieces, run_piece, scenario_of_run
@@ -96,7 +96,7 @@ def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
 
 
 def test_what_the_core_reduces_equals_what_is_made_of_the_samples(tmp_path: Path):
-    keep = {how: f"{how}({variable})" for how, variable in zip(REDUCTIONS, CHANNEL_NAMES[2:], strict=False)}
+    keep = {how: f"{how}({variable})" for how, variable in zip(REDUCTIONS, [v.name for v in VARIABLES if not v.derived][2:], strict=False)}
     reduced, sampled = (make(keep=keep | more) for more in ({}, {"more": "peak(abs(twist))"}))
     assert not run_piece(reduced, 0, 4, 1).samples
     assert run_piece(sampled, 0, 4, 1).samples
@@ -106,7 +106,7 @@ def test_what_the_core_reduces_equals_what_is_made_of_the_samples(tmp_path: Path
     result = lm.simulate(scenario_of_run(reduced, 5))
     plain = {"peak": lambda v: np.max(np.abs(v)), "rms": lambda v: np.sqrt(np.mean(v**2)), "mean": np.mean}
     plain |= {"final": lambda v: v[-1], "least": np.min, "largest": np.max}
-    for (how, function), variable in zip(plain.items(), CHANNEL_NAMES[2:], strict=False):
+    for (how, function), variable in zip(plain.items(), [v.name for v in VARIABLES if not v.derived][2:], strict=False):
         assert rows[how][5] == pytest.approx(function(result[variable].values), rel=1e-13), how
 
 

@@ -18,6 +18,9 @@ from lostmotion.simulation.runs.results import ENERGY
 from lostmotion.simulation.variables import VARIABLES
 from lostmotion.studies.expressions.expressions import OF_THE_RUN, read_expression
 from lostmotion.studies.expressions.functions import FUNCTIONS, METHODS
+from lostmotion.studies.expressions.vocabulary import vocabulary_of
+
+VOCABULARY = vocabulary_of(lm.load("paper-2dof-nl-small"))
 
 
 @pytest.mark.parametrize(
@@ -42,7 +45,7 @@ from lostmotion.studies.expressions.functions import FUNCTIONS, METHODS
 )
 def test_an_expression_has_the_unit_of_what_it_gives(expression: str, unit: str):
     parse = pint.UnitRegistry().Unit
-    found = read_expression(expression).unit
+    found = read_expression(expression, VOCABULARY).unit
     assert (found == "") == (unit == "")
     assert parse("" if found == "1" else found.replace("^", "**")) == parse("" if unit == "1" else unit)
 
@@ -92,7 +95,7 @@ def sampled() -> dict[str, xr.DataArray]:
 def test_an_expression_gives_what_xarray_gives_for_it(expression: str):
     data = sampled()
     expected = eval(expression, {"__builtins__": {}}, dict(data))  # of the list above
-    assert read_expression(expression).values(data, 3) == pytest.approx(expected.values, rel=1e-14, nan_ok=True)
+    assert read_expression(expression, VOCABULARY).values(data, 3) == pytest.approx(expected.values, rel=1e-14, nan_ok=True)
 
 
 def test_functions_and_chains_of_comparisons_give_what_numpy_gives():
@@ -111,7 +114,7 @@ def test_functions_and_chains_of_comparisons_give_what_numpy_gives():
         "9**9**9**9": np.full(3, np.inf),
     }
     for text, values in expected.items():
-        assert read_expression(text).values(data, 3) == pytest.approx(values, rel=1e-13), text
+        assert read_expression(text, VOCABULARY).values(data, 3) == pytest.approx(values, rel=1e-13), text
 
 
 # --- what is refused ---
@@ -277,7 +280,7 @@ def test_what_is_not_in_the_grammar_is_refused_before_anything_runs(expression: 
     monkeypatch.chdir(tmp_path)
     begun = time.process_time()
     with pytest.raises(ValueError, match=r".") as caught:
-        read_expression(expression)
+        read_expression(expression, VOCABULARY)
     assert "\n" not in str(caught.value)
     assert len(str(caught.value)) < 2600
     assert time.process_time() - begun < 2.0
@@ -306,7 +309,7 @@ PIECES = (*NAMES, *(f"energy.{e}" for e in ENERGY), *"()[]{}.,+-*/~&|<>='", "'ti
 @given(st.lists(st.sampled_from(PIECES), max_size=9))
 def test_whatever_is_written_is_either_read_and_has_a_value_for_each_run_or_refused(pieces: list[str]):
     try:
-        expression = read_expression("".join(pieces))
+        expression = read_expression("".join(pieces), VOCABULARY)
     except ValueError:
         return
     names = sampled() | {"energy": {e: xr.DataArray(np.ones(3), dims="run") for e in ENERGY}}

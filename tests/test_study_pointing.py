@@ -11,6 +11,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import lostmotion as lm
+from lostmotion.simulation.forms.key_aliases import DRIVE
 from lostmotion.studies.runs.chunk import scenario_of_run
 
 CAMERA = {"sample_time": 5e-3, "latency": 10e-3, "noise": 1e-4, "seed": 4}
@@ -54,8 +55,8 @@ def test_rows_are_those_of_single_runs_for_any_number_of_workers(make: Any, pref
     for run in range(4):
         s = scenario_of_run(study, run)
         r = lm.simulate(s, energy=False)
-        axis = s.controller if s.is_drive else s.controllers["traverse_drive"]
-        shaft = "load" if s.is_drive else "traverse"
+        axis = s.controller if s.form == DRIVE else s.controllers["traverse_drive"]
+        shaft = "load" if s.form == DRIVE else "traverse"
         missed = axis.reference.at(r.time.values)[0] - r[f"{shaft}_angle"].values
         assert found[0]["rms"][run].as_py() == pytest.approx(np.sqrt(np.mean(missed**2)), rel=1e-14)
         assert found[0]["peak"][run].as_py() == np.abs(missed[r.time.values > 0.1]).max()
@@ -78,6 +79,6 @@ def test_an_axis_begins_on_its_reference() -> None:
     assert steps["traverse_angle"] == float(r["traverse_angle"][0])
     for s, key in ((drive, "initial.load_angle"), (train, "initial.angles")):
         with pytest.raises(lm.InputError, match="follows from it"):
-            s.replace(**{key: 0.1 if s.is_drive else {"traverse": 0.1}})
+            s.replace(**{key: 0.1 if s.form == DRIVE else {"traverse": 0.1}})
     with pytest.raises(lm.InputError, match="no controller"):
         lm.load("paper-2dof-nl-small", {"initial.on_reference": True})

@@ -163,7 +163,7 @@ def _plant_of(scenario: Scenario) -> Plant:
         signals={name: signals[name] for name in core.input_names()},
         source=source,
         start=start_of(scenario.initial),
-        rest=start_of(scenario.initial.at_rest()),
+        rest=start_of(scenario.tables.initial.at_rest()),
         start_of=start_of,
         channels=tuple(name for name, *_ in core.channels()),
         variables=scenario.variables(),

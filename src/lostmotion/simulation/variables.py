@@ -26,5 +26,3 @@ def variables_of_core(rows: Iterable[tuple[str, str, str, str, bool]]) -> tuple[
 
 VARIABLES = variables_of_core(_core.variables())
 """names for a motor, a gearbox and a load"""
-CHANNEL_NAMES = tuple(v.name for v in VARIABLES if not v.derived)
-STATES = tuple(_core.states())

@@ -67,10 +67,8 @@ class Initial(Part):
         return made
 
     @classmethod
-    def of_state(
-        cls, state: TrainInitial, shaft: str = MOTOR, load: str = LOAD, motor: str = MOTOR, gear: str = GEARBOX
-    ) -> Initial:
-        """The state of a drive from the state of its train, whose shafts, motor and gear have these names.
+    def of_state(cls, state: TrainInitial) -> Initial:
+        """The state of a drive from the state of its train.
 
         Raises
         ------
@@ -78,21 +76,17 @@ class Initial(Part):
             It has a value that a drive does not have.
         """
         keys = {
-            ("speeds", shaft): "motor_speed",
-            ("speeds", load): "load_speed",
-            ("angles", load): "load_angle",
-            ("twists", gear): "twist",
-            ("motor_torques", motor): "motor_torque",
-            ("hysteresis_capacities", gear): "hysteresis_capacity",
+            ("speeds", MOTOR): "motor_speed",
+            ("speeds", LOAD): "load_speed",
+            ("angles", LOAD): "load_angle",
+            ("twists", GEARBOX): "twist",
+            ("motor_torques", MOTOR): "motor_torque",
+            ("hysteresis_capacities", GEARBOX): "hysteresis_capacity",
         }
         given = {(key, name): x for key, values in state if isinstance(values, dict) for name, x in values.items()}
         if unknown := [f"initial.{key}.{name}" for key, name in given if (key, name) not in keys]:
             raise InputError("is no state of a motor, a gearbox and a load; leave it out", *unknown)
         return cls(**{keys[place]: x for place, x in given.items()}, on_reference=state.on_reference)
-
-    def at_rest(self) -> Initial:
-        """The same without motion and twist."""
-        return Initial()
 
 
 class DriveTables(ScenarioTables):

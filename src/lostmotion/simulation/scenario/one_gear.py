@@ -20,10 +20,8 @@ def drive_keys(scenario: Scenario) -> dict[str, str]:
     return found | {f"command.{motor}": "command"}
 
 
-def is_drive(scenario: Scenario) -> bool:
+def has_one_gear(scenario: Scenario) -> bool:
     """Whether it is one motor that turns one load through one gearbox."""
-    if scenario.is_drive:
-        return True
     train = scenario.train()
     others = (name for table in OTHERS for name in getattr(train, table))
     if any(others) or scenario.slides or scenario.given():

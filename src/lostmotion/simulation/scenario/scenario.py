@@ -202,7 +202,7 @@ class Scenario:
 
     @kept
     def _written(self) -> DriveTables | TrainTables:
-        return DriveTables.of_long(self.tables) if self.is_drive else self.tables
+        return DriveTables.of_long(self.tables) if self.form == DRIVE else self.tables
 
     def __getattr__(self, name: str) -> Any:
         for tables in () if name.startswith("_") else (self.written, self.tables):
@@ -217,7 +217,11 @@ class Scenario:
         return iter(self.written)
 
     def __eq__(self, other: object) -> bool:
-        same = isinstance(other, Scenario) and self.tables == other.tables and self.is_drive == other.is_drive
+        same = (
+            isinstance(other, Scenario)
+            and self.tables == other.tables
+            and (self.form == DRIVE) == (other.form == DRIVE)
+        )
         return same if isinstance(other, Scenario) else NotImplemented
 
     def __hash__(self) -> int:
@@ -311,7 +315,7 @@ class Scenario:
 
     def own_key(self, key: str) -> str:
         """A key of the long form as the tables that are kept have it."""
-        return self.form.in_file(key) if self.is_drive else key
+        return self.form.in_file(key) if self.form == DRIVE else key
 
     def controller_key(self, motor: str) -> str:
         """Key of the table of a motor's controller."""
@@ -368,19 +372,14 @@ class Scenario:
         written = self.written
         return written.drive() if isinstance(written, DriveTables) else self.train()
 
-    @property
-    def is_drive(self) -> bool:
-        """Whether its file has the tables `motor`, `gearbox` and `load`."""
-        return self.form == DRIVE
-
     @kept
     def long(self) -> Scenario:
         """The scenario in the long form; of a drive with shafts `motor` and `load`, gear `gearbox`, motor `motor`."""
-        return self.of(self.tables, checked=False) if self.is_drive else self
+        return self.of(self.tables, checked=False) if self.form == DRIVE else self
 
     def train(self) -> DriveTrain:
         """The drive train without its surroundings, with the names that variables have in results of this scenario."""
-        return self._drive_of_one_gear() if self.is_drive else self.tables.train()
+        return self._drive_of_one_gear() if self.form == DRIVE else self.tables.train()
 
     @kept
     def _drive_of_one_gear(self) -> DriveOfOneGear:

@@ -16,15 +16,12 @@ import numpy as np
 
 from ...inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
 from ...inputs.validation import MAX_LISTED, listed, nearest, shortened
-from ...simulation.variables import VARIABLES
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, FunctionParameter
 from .measures import Measure, measure, plain, power, product, text_of, total
-from .vocabulary import OF_DRIVES, OF_THE_RUN, Vocabulary
+from .vocabulary import OF_THE_RUN, Vocabulary
 
 Names = Mapping[str, Any]
 """values by name: variables (run, time), `energy` (entry -> runs), `bandwidth` (a function of the amplitude)"""
-
-KNOWN_UNITS = ("1", *dict.fromkeys(v.unit for v in VARIABLES), "J", "Hz", "N*m/rad")
 
 LOGIC: dict[type[ast.operator], Callable[[Any, Any], Any]] = {ast.BitAnd: operator.and_, ast.BitOr: operator.or_}
 # What is not in the grammar but may be tried, and what to write instead.
@@ -59,7 +56,7 @@ class Expression:
     Raises ValueError: it cannot be read, uses what the grammar does not have, or leaves a value for each instant.
     """
 
-    def __init__(self, text: str, vocabulary: Vocabulary = OF_DRIVES) -> None:
+    def __init__(self, text: str, vocabulary: Vocabulary) -> None:
         self.text, shown = text, shortened(text, MAX_LISTED)
         tree = syntax_tree(text, "an expression", "split it into several columns")
         self.names = frozenset(node.id for node in ast.walk(tree) if isinstance(node, ast.Name))  # all that it names
@@ -74,7 +71,8 @@ class Expression:
         self.indices = tuple(reader.indices)  # samples that it reads by .isel(time=...)
         self.variables = (self.names & known) | ({vocabulary.command} if "ideal_speed" in self.names else frozenset())
         """the result variables that it needs"""
-        self.unit = text_of(self._term.measure, KNOWN_UNITS)
+        units = dict.fromkeys(unit for _, unit in vocabulary.variables)
+        self.unit = text_of(self._term.measure, ("1", *units, "J", "Hz", "N*m/rad"))
         """unit of the values, ``"1"`` for a plain number; empty where it cannot be determined"""
         self.reduction: tuple[str, str] | None = None
         """reduction and variable, if it is nothing else, so that the core can do it"""
@@ -91,7 +89,7 @@ class Expression:
 
 
 @lru_cache(maxsize=1000)
-def read_expression(text: str, vocabulary: Vocabulary = OF_DRIVES) -> Expression:
+def read_expression(text: str, vocabulary: Vocabulary) -> Expression:
     """The expression of a text; each is read once."""
     return Expression(text, vocabulary)
 

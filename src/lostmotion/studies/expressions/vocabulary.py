@@ -7,10 +7,8 @@ from typing import NamedTuple
 
 from ...control.shaft_ratio import turns
 from ...simulation.runs.pointing_error import pointing_names
-from ...simulation.runs.results import ENERGY
 from ...simulation.scenario.field_oriented_motors import bound_names
 from ...simulation.scenario.scenario import Scenario
-from ...simulation.variables import CHANNEL_NAMES, VARIABLES
 from ...simulation.variables_of_trains import axis_variables
 
 OF_TRAINS = ("energy", "time")
@@ -26,15 +24,7 @@ class Vocabulary(NamedTuple):
     channels: tuple[str, ...]  # variables that the core returns; the others follow from these
     energies: tuple[tuple[str, str], ...]  # entries of the ledger, each as expressions call it and as the ledger does
     of_the_run: tuple[str, ...]
-    command: str = "command"  # the command of the one motor
-
-
-OF_DRIVES = Vocabulary(
-    tuple((v.name, v.unit) for v in VARIABLES),
-    tuple(CHANNEL_NAMES),
-    tuple((entry, entry) for entry in ENERGY),
-    OF_THE_RUN,
-)
+    command: str = ""  # the command of the one motor
 
 
 def _controlled(scenario: Scenario) -> Iterator[tuple[str, str]]:

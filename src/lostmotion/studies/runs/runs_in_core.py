@@ -13,7 +13,7 @@ from ...simulation.forms.dotted_keys import renamed
 from ...simulation.runs.core_runs import core_case
 from ...simulation.runs.pointing_error import pointed
 from ...simulation.runs.separate_trains import parts_of
-from ...simulation.scenario.one_gear import drive_keys, is_drive
+from ...simulation.scenario.one_gear import drive_keys, has_one_gear
 from ...simulation.scenario.scenario import Scenario
 from ..expressions.functions import REDUCTIONS
 from ..study.drive_check_columns import COLUMNS, check_columns
@@ -39,7 +39,7 @@ def together(study: Study) -> bool:
 def core_can(study: Study) -> bool:
     """Whether all that varies is a plain number that the core changes by itself, and the runs are all that is wanted."""
     s = study.scenario
-    if checks_drives(study) or not together(study) or not is_drive(s):
+    if checks_drives(study) or not together(study) or not has_one_gear(s):
         return False
     ((_, motor),), ((_, gear),) = s.train().motors.items(), s.train().gears.items()
     rigid = isinstance(gear.stiffness, Rigid)
