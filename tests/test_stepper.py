@@ -422,6 +422,16 @@ def test_a_telescope_s_stepper_turns_its_axis_by_the_steps_that_its_controller_c
     assert float(lm.simulate(scenario).axis_angle[-1]) == pytest.approx(24 * 0.625 * arcsec, rel=1e-4)
 
 
+def test_the_response_to_the_field_is_that_of_a_rotor_on_its_spring() -> None:
+    """i w n T_H/(n T_H - w^2 J + i w b) of a field that swings by 1e-5 rad, where sine and angle differ by 1e-8 and lines and sine by 1e-7 of the holding torque."""
+    b, error = 2e-3, 1e-7
+    moves = {"stepping": {"reference": {"moves": [{"to": 1.0}], "speed": 2.0, "acceleration": 20.0}}}
+    k, w = N * T_H, 2.0 * math.pi * np.array([1.0, 100.0, 200.0, 400.0])
+    found = lm.frequency_response(alone(moves, viscous=b, torque_error=error * T_H), w / (2.0 * math.pi), 1e-5)["response"]
+    exact = 1j * w * k / (k - w**2 * J + 1j * w * b)
+    assert np.abs(found.sel(output="motor_speed").values[0] / exact - 1.0).max() < 1e-5
+
+
 def test_a_loop_around_a_stepper_is_refused() -> None:
     tables = lm.load("speed-axis").written.model_dump(exclude_none=True)
     tables["motor"] = MOTOR

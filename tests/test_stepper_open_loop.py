@@ -1,5 +1,6 @@
 """The report on the axis of a stepper without a loop."""
 
+import csv
 import math
 
 import pytest
@@ -99,7 +100,7 @@ def test_lost_steps_and_moves_that_do_not_settle_do_not_fit():
     assert lm.sizing.open_loop(train(), window=1e-2).verdict.state == "fits"
 
 
-@pytest.mark.parametrize("option", [["--tune", "margins"], ["--drive-units"], ["-o", "sheet"]])
+@pytest.mark.parametrize("option", [["--tune", "margins"], ["--drive-units"]])
 def test_what_a_loop_would_do_is_refused_with_the_reason(option: list[str]):
     answer = CliRunner().invoke(app, ["servo", "stepper-belt-axis", *option])
     assert answer.exit_code == 1
@@ -111,6 +112,20 @@ def test_the_command_prints_the_report():
     assert answer.exit_code == 0
     for word in ("65.19 Hz", "none lost", "settling", "reversal error"):
         assert word in answer.output
+
+
+def test_the_page_has_the_error_the_lag_and_the_settling_of_each_move(tmp_path):
+    answer = CliRunner().invoke(app, ["servo", "stepper-belt-axis", "-o", str(tmp_path)])
+    assert answer.exit_code == 0
+    page = (tmp_path / "servo.html").read_text()
+    for word in ("Verdict: fits", "field before the rotor", "65.19 Hz", "Settling"):
+        assert word in page
+    rows = list(csv.reader((tmp_path / "open-loop.csv").read_text().splitlines()))
+    found = lm.sizing.open_loop(lm.load("stepper-belt-axis"))
+    error = [float(row[3]) for row in rows if row[:2] == ["error of slide", "error"]]
+    assert max(map(abs, error)) == pytest.approx(1e6 * found.following)
+    lag = [float(row[3]) for row in rows if row[0] == "field before the rotor"]
+    assert 70.0 < max(map(abs, lag)) / found.lost.largest_lag < 90.0  # 90 degrees to a full step; samples miss some of it
 
 
 def test_a_scenario_without_a_stepper_is_refused():

@@ -6,9 +6,11 @@ import math
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from typer.testing import CliRunner
 
 import lostmotion as lm
 from conftest import ROOT
+from lostmotion.cli import app
 
 NEMA_17 = {
     "kind": "stepper",
@@ -160,6 +162,13 @@ def test_a_winding_is_refused_by_name_where_regimes_are_linear() -> None:
         with pytest.raises(lm.InputError, match="supply_voltage") as refusal:
             refused()
         assert refusal.value.problems[0].keys in (("axis.motor.supply_voltage",), ())
+
+
+def test_the_check_runs_a_winding_and_compares_it_with_its_pull_out_curve() -> None:
+    short = ["--set", 'axis.motor.supply_voltage="24 V"', "--set", 'simulation.duration="0.1 s"']
+    answer = CliRunner().invoke(app, ["check", "stepper-belt-axis", *short])
+    assert answer.exit_code == 0, answer.exception
+    assert "safety" in answer.output
 
 
 @pytest.mark.parametrize("key", ["rated_current", "resistance_phase", "inductance_phase"])

@@ -143,8 +143,8 @@ def servo(
     from ..simulation.runs.pointing_error import pointed
 
     if not loaded.axes() and pointed(loaded):
-        options_of_loops = {"--tune": rule, "--drive-units": drive_units or None, "-o": output or None}
-        _open_loop(loaded, scenario, motor, window, options_of_loops)
+        options_of_loops = {"--tune": rule, "--drive-units": drive_units or None}
+        _open_loop(loaded, scenario, motor, window, options_of_loops, directories, pictures, again(scenario, overrides))
         return
     from ..servo.commission import commission, work
 
@@ -190,10 +190,19 @@ def _print_drive_units(scenario: Scenario, motor: str | None) -> None:
 
 
 def _open_loop(
-    loaded: Scenario, source: str, motor: str | None, window: str | None, asked: Mapping[str, object]
+    loaded: Scenario,
+    source: str,
+    motor: str | None,
+    window: str | None,
+    asked: Mapping[str, object],
+    directories: list[Path],
+    pictures: tuple[str, ...],
+    repeated: str,
 ) -> None:
-    """Print what can be said of the axis of a stepper, which has no loop."""
+    """Print what can be said of the axis of a stepper, which has no loop, with its page on request."""
     from ..errors import InputError
+    from ..reports.open_loop import open_loop_report
+    from ..reports.pages import write_report
     from ..simulation.runs.pointing_error import pointed
     from ..sizing.stepper_axis import NO_LOOP, open_loop
     from ..units.conversion import si_value
@@ -212,7 +221,15 @@ def _open_loop(
         found = open_loop(loaded, motor=motor, window=within)
     print(loaded.title or Path(source).stem)
     _print_columns(found.summary())
-    print(f"Next: lostmotion track {source}")
+    for path in directories:
+        with writing(path), busy("Writing"):
+            page = write_report(path, open_loop_report(Path(source).stem, loaded.title, found), pictures)
+        print(f"Report written to {page}")
+    print(
+        f"Next: lostmotion track {repeated}"
+        if directories
+        else f"The same on a page: lostmotion servo {repeated} -o sheet"
+    )
     conclude(found.verdict)
 
 

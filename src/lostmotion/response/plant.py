@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..control.command import CommandSignal, CurrentLevel, FieldAngle
 from ..control.controller import AnyReference
 from ..errors import InputError
 from ..inputs.validation import listed, shown
@@ -160,7 +161,7 @@ def _plant_of(scenario: Scenario) -> Plant:
     return Plant(
         train=train,
         core=core,
-        signals={name: signals[name] for name in core.input_names()},
+        signals={name: _without_steps(signals[name]) for name in core.input_names()},
         source=source,
         start=start_of(scenario.initial),
         rest=start_of(scenario.tables.initial.at_rest()),
@@ -173,6 +174,13 @@ def _plant_of(scenario: Scenario) -> Plant:
         floors=floors,
         scenario=scenario,
     )
+
+
+def _without_steps(signal: Signal[Any]) -> Signal[Any]:
+    """The angle of a stepper's field where it starts, at the current of its motion; any other signal as it is."""
+    if isinstance(signal, FieldAngle):
+        return CommandSignal(mean=signal.start)
+    return CommandSignal(mean=1.0) if isinstance(signal, CurrentLevel) else signal
 
 
 def known_output(output: str, known: Sequence[str]) -> str:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -48,6 +48,12 @@ class OpenLoop:
     reversal: float | None
     """at rest after moves forward less after moves backward, magnitude; None where moves go one way"""
     lost: LostSteps
+    time: np.ndarray = field(repr=False, compare=False)
+    """instants of the run [s]"""
+    error: np.ndarray = field(repr=False, compare=False)
+    """reference less shaft, over them"""
+    electrical_angle: np.ndarray = field(repr=False, compare=False)
+    """of the field before the rotor, over them [rad]"""
 
     @property
     def verdict(self) -> Verdict:
@@ -123,14 +129,14 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
     assert stepping is not None
     within = MICROSTEPS_OF_WINDOW * m.full_step / stepping.microsteps / abs(ratio) if window is None else window
     settling, reversal = _after_moves(reference, result.time, error, within)
-    field = 0.25 * m.steps_per_revolution * m.holding_torque * ratio * ratio
-    stiffness, resonances = _chain(scenario, field)
+    spring = 0.25 * m.steps_per_revolution * m.holding_torque * ratio * ratio
+    stiffness, resonances = _chain(scenario, spring)
     (lost,) = (found for found in found_in(scenario, result) if found.motor == name)
     return OpenLoop(
         name,
         shaft,
         train.angle_unit(shaft),
-        field,
+        spring,
         stiffness,
         resonances,
         float(np.abs(error).max()),
@@ -138,6 +144,9 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
         settling,
         reversal,
         lost,
+        result.time,
+        error,
+        result[f"{name}_electrical_angle"],
     )
 
 

@@ -8,9 +8,10 @@ import time
 from typing import NamedTuple
 
 from ..scenario.field_oriented_motors import oriented
+from ..scenario.requirements import wound
 from ..scenario.scenario import Scenario
 from .core_runs import core_result
-from .run import MAX_SWITCHINGS
+from .run import MAX_SWITCHINGS, TOLERANCE_OF_WINDINGS
 
 SHARES = tuple(math.ldexp(1.0, -3 * k) for k in range(6, 1, -1))  # of a stretch, that are tried one after the other
 ENOUGH = 0.1  # [s] after which no longer part is tried
@@ -28,11 +29,12 @@ class Forecast(NamedTuple):
 def forecast(scenario: Scenario, tolerance: float = 0.0) -> Forecast:
     """Estimate the length of a run. That takes a fiftieth of its time, or some tenths of a second.
 
-    tolerance: relative one of the adaptive solver; 0: the exact solver.
+    tolerance: relative one of the adaptive solver; 0: that of the run by default.
 
     Raises SolverError: the motion has no continuation.
     """
     control = scenario.control({})
+    tolerance = tolerance or (TOLERANCE_OF_WINDINGS if any(wound(scenario)) else 0.0)
 
     def taken(end: float) -> tuple[float, int]:
         """Processor time of the run up to a time [s], and its switchings."""
