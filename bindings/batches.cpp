@@ -83,15 +83,24 @@ Array read_contacts(const batch::DriveBatch& b, Read&& read) {
 }
 
 Scenario batch_scenario(const TrainDescription& train, const BoundControl& control) {
-    Scenario s;
-    s.train = train.train;
-    s.control = control_of(control);
-    s.references_given = true;
-    const model::Assembly a(s.train);
-    s.start.resize(static_cast<std::size_t>(a.layout().states));
-    s.hysteresis_capacities.resize(s.train.gears.size());
-    if (const std::string error = check_control(a, s.control); !error.empty()) throw nb::value_error(error.c_str());
+    Scenario s = stepped_scenario(train.train, control_of(control));
+    if (const std::string error = check_control(model::Assembly(s.train), s.control); !error.empty())
+        throw nb::value_error(error.c_str());
     return s;
+}
+
+std::vector<Scenario> batch_scenarios(const std::vector<const TrainDescription*>& trains,
+                                      const std::vector<BoundControl>& controls) {
+    std::vector<Scenario> kinds;
+    for (std::size_t k = 0; k < trains.size(); ++k) kinds.push_back(batch_scenario(*trains[k], controls[k]));
+    return kinds;
+}
+
+template <class Batch>
+std::vector<std::string> variable_names(const Batch& b) {
+    std::vector<std::string> names;
+    for (const Variable& v : b.variables().all()) names.push_back(v.name);
+    return names;
 }
 
 void bind_exact_batch(nb::module_& m) {
@@ -101,12 +110,8 @@ void bind_exact_batch(nb::module_& m) {
         .def(
             "__init__",
             [](B* self, const std::vector<const TrainDescription*>& trains, const std::vector<BoundControl>& controls,
-               const std::vector<int>& kind_of, double step) {
-                std::vector<Scenario> kinds;
-                for (std::size_t k = 0; k < trains.size(); ++k)
-                    kinds.push_back(batch_scenario(*trains[k], controls[k]));
-                new (self) B(kinds, kind_of, step);
-            },
+               const std::vector<int>& kind_of,
+               double step) { new (self) B(batch_scenarios(trains, controls), kind_of, step); },
             "trains"_a, nb::kw_only(), "controls"_a, "kind_of"_a, "step"_a)
         .def(
             "step",
@@ -152,12 +157,7 @@ void bind_exact_batch(nb::module_& m) {
             "which"_a.none(), "start"_a)
         .def_prop_ro("inputs", &B::inputs)
         .def_prop_ro("states", &B::states)
-        .def_prop_ro("variables",
-                     [](const B& b) {
-                         std::vector<std::string> names;
-                         for (const Variable& v : b.variables()) names.push_back(v.name);
-                         return names;
-                     })
+        .def_prop_ro("variables", &variable_names<B>)
         .def_prop_ro(
             "values", [](B& b) { return batch_rows(b, b.values(), b.variables().size()); },
             "The values of all drives, by variable; each step writes them anew.")
@@ -204,12 +204,10 @@ void bind_batches(nb::module_& m) {
     nb::class_<B>(m, "DriveBatch")
         .def(
             "__init__",
-            [](B* self, const std::vector<const TrainDescription*>& kinds, std::vector<int> kind_of, double step) {
-                std::vector<model::Train> trains;
-                for (const TrainDescription* t : kinds) trains.push_back(t->train);
-                new (self) B(trains, std::move(kind_of), step);
-            },
-            "kinds"_a, nb::kw_only(), "kind_of"_a, "step"_a)
+            [](B* self, const std::vector<const TrainDescription*>& trains, const std::vector<BoundControl>& controls,
+               std::vector<int> kind_of,
+               double step) { new (self) B(batch_scenarios(trains, controls), std::move(kind_of), step); },
+            "trains"_a, nb::kw_only(), "controls"_a, "kind_of"_a, "step"_a)
         .def(
             "set",
             [](B& b, const std::string& key, const BatchInput& values) {
@@ -221,8 +219,11 @@ void bind_batches(nb::module_& m) {
             "replace", [](B& b, std::size_t k, const TrainDescription& train) { b.replace(k, train.train); }, "k"_a,
             "train"_a, "Gives a drive a train of its own.")
         .def_static(
-            "error", [](const TrainDescription& t) { return B::error(t.train); }, "train"_a,
-            "What keeps a train from being stepped in a batch, or nothing.")
+            "error",
+            [](const TrainDescription& t, const BoundControl& control) {
+                return B::error(t.train, control_of(control));
+            },
+            "train"_a, "control"_a, "What keeps a train and its controllers from being stepped in a batch, or nothing.")
         .def_static(
             "laws", [](const TrainDescription& t) { return laws_of_drive(t.train); }, "train"_a,
             nb::sig("def laws(train: Train) -> dict[str, Any]"),
@@ -263,6 +264,14 @@ void bind_batches(nb::module_& m) {
              [](const B& b) { return read_contacts(b, [&](std::int8_t* out) { b.read_input_contact(out); }); })
         .def("twist_contact",
              [](const B& b) { return read_contacts(b, [&](std::int8_t* out) { b.read_twist_contact(out); }); })
+        .def_prop_ro("inputs", [](const B& b) { return b.names().inputs; })
+        .def_prop_ro("variables", &variable_names<B>)
+        .def(
+            "read",
+            [](B& b, std::size_t variable) {
+                return read_batch(b, [&](double* out) { b.read_variable(variable, out); });
+            },
+            "variable"_a, "The values of a variable, by its number among the names.")
         .def("snapshot", &B::snapshot)
         .def("restore", &restore_batch<B>, "snapshot"_a)
         .def_prop_ro("counts",

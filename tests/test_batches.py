@@ -10,6 +10,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion import _core
+from lostmotion.simulation.batches.walked_batches import WalkedBatch
 
 STEP = 1e-3
 
@@ -233,6 +234,13 @@ def test_a_drive_of_its_own_takes_less_than_400_bytes_however_long_it_moves() ->
     )
     run(batch, random_commands(generator, 200, count))
     assert batch.memory / count < 400.0
+
+
+def test_a_controlled_drive_takes_less_than_800_bytes() -> None:
+    scenario = lm.load("position-axis")
+    batch = lm.SimulationBatch(scenario, STEP, vary={"load.inertia": np.linspace(1.0, 2.0, 50)})
+    batch.step(0.01)
+    assert batch.memory < 800 * 50
 
 
 def test_outputs_are_not_copied() -> None:
@@ -540,7 +548,60 @@ def test_controllers_act_at_their_instants_as_on_a_drive_alone() -> None:
         assert batch["load_speed"][k] == pytest.approx(alone["load_speed"], abs=1e-5)
         assert batch["torque_reference"][k] == pytest.approx(alone["torque_reference"], abs=1e-6)
     assert np.abs(batch["load_angle"] - targets).max() < 2e-3
-    assert batch.counts["general"] == batch.counts["steps"] == 12000
+    assert batch.counts["general"] < batch.counts["steps"] == 12000
+
+
+CONTROLLED = [
+    ("position-axis", 0.02),
+    ("position-axis-load-encoder", 0.02),
+    ("speed-axis", 20.0),
+    ("tracking-adaptive", 0.01),
+    ("tracking-camera", 0.01),
+]
+
+
+@pytest.mark.parametrize(("name", "move"), CONTROLLED)
+@pytest.mark.parametrize("step", [0.37e-3, 5e-3])
+def test_a_walk_from_sample_to_sample_is_the_motion_of_the_general_solver(
+    name: str, move: float, step: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """All variables, with moving references, a reset, a written parameter and a snapshot on the way."""
+    scenario, count = lm.load(name), 8
+    options = {"step": step, "vary": {"load.inertia": scenario.load.inertia * np.linspace(1.0, 1.5, count)}}
+    walked = lm.SimulationBatch(scenario, **options)
+    monkeypatch.setattr(WalkedBatch, "takes", staticmethod(lambda scenarios: False))
+    general = lm.SimulationBatch(scenario, **options)
+    generator, reference = np.random.default_rng(5), np.zeros(count)
+    for k in range(60):
+        reference = reference + move * generator.normal(size=count)
+        load = generator.normal(size=count) * (k % 3)
+        for batch in (walked, general):
+            if k == 30:
+                batch.parameters["load.inertia"][3] *= 1.2
+            if k == 40:
+                batch.reset(np.arange(count) % 3 == 0)
+            batch.step(reference, load)
+        if k == 50:
+            before = walked.snapshot()
+            walked.step(0.0)
+            walked.restore(before)
+    assert general.counts["general"] == 60 * count and walked.counts["general"] < 6 * count
+    for variable in general.variables:
+        right = general[variable]
+        np.testing.assert_allclose(walked[variable], right, 1e-9, 1e-12 + 1e-9 * np.nanmax(np.abs(right)), err_msg=variable)
+
+
+def test_a_written_inertia_acts_with_the_whole_of_the_next_step() -> None:
+    """Newton's law; a third shaft leaves the train to the general solver."""
+    shafts = {"rotor": {"inertia": 1e-3}, "wheel": {"inertia": 2.0}, "free": {"inertia": 1.0}}
+    motor = {"shaft": "rotor", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 1e-3}
+    train = lm.DriveTrain(shafts=shafts, motors={"motor": motor}, gears={"mesh": {"input": "rotor", "output": "wheel", "ratio": 2.0}})
+    batch = lm.SimulationBatch(train, STEP, count=2)
+    batch.step(motor_command=0.0, free_load_torque=3.0)
+    before = batch["free_speed"].copy()
+    batch.parameters["shafts.free.inertia"][1] = 4.0
+    batch.step(motor_command=0.0, free_load_torque=3.0)
+    assert batch["free_speed"] - before == pytest.approx([-3.0 * STEP, -0.75 * STEP], rel=1e-12)
 
 
 @pytest.mark.parametrize("threads", [1, 2])

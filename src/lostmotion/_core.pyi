@@ -499,7 +499,7 @@ class BatchSnapshot:
     pass
 
 class DriveBatch:
-    def __init__(self, kinds: Sequence[Train], *, kind_of: Sequence[int], step: float) -> None: ...
+    def __init__(self, trains: Sequence[Train], *, controls: Sequence[tuple[float, Sequence[Axis]]], kind_of: Sequence[int], step: float) -> None: ...
 
     def set(self, key: str, values: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None:
         """Sets a parameter of all drives, by its key in the short form."""
@@ -508,8 +508,10 @@ class DriveBatch:
         """Gives a drive a train of its own."""
 
     @staticmethod
-    def error(train: Train) -> str:
-        """What keeps a train from being stepped in a batch, or nothing."""
+    def error(train: Train, control: tuple[float, Sequence[Axis]]) -> str:
+        """
+        What keeps a train and its controllers from being stepped in a batch, or nothing.
+        """
 
     @staticmethod
     def laws(train: Train) -> dict[str, Any]:
@@ -535,6 +537,15 @@ class DriveBatch:
     def input_contact(self) -> NDArray[numpy.float64]: ...
 
     def twist_contact(self) -> NDArray[numpy.float64]: ...
+
+    @property
+    def inputs(self) -> list[str]: ...
+
+    @property
+    def variables(self) -> list[str]: ...
+
+    def read(self, variable: int) -> NDArray[numpy.float64]:
+        """The values of a variable, by its number among the names."""
 
     def snapshot(self) -> BatchSnapshot: ...
 

@@ -5,7 +5,7 @@
 #include <utility>
 
 #include "../model/drive_train.hpp"
-#include "../simulation/train_status.hpp"
+#include "../simulation/train_control.hpp"
 
 namespace lostmotion::batch {
 
@@ -32,37 +32,58 @@ void set_gap(model::Train& train, double half_gap) {
     curve = TorsionCurve(std::move(breaks), std::move(slopes));
 }
 
+auto& at(auto& list, int place) { return list[static_cast<std::size_t>(place)]; }
+
 }  // namespace
 
-// What a thread keeps: general solvers of some drives.
+// What a thread keeps: controllers, whose references change, and general solvers of some drives.
 struct DriveBatch::Worker {
     struct Kept {
         std::size_t number;
         long used;
-        std::unique_ptr<TrainSimulation> simulation;
+        std::unique_ptr<ScenarioSimulation> simulation;
     };
+    std::vector<control::Axis> laws;
     std::vector<Kept> solvers;
     long clock = 0;
     Counts counts;
     Failure failure;
     MotionState state;  // its memory is used again
+    std::vector<double> slots, values;
 };
 
-std::string DriveBatch::error(const model::Train& train) {
+std::string DriveBatch::error(const model::Train& train, const Control& control) {
     const TrainRun run(train);
-    return run.error().empty() ? not_walked(train) : run.error();
+    if (!run.error().empty()) return run.error();
+    if (std::string error = not_walked(train); !error.empty()) return error;
+    for (const ControlledAxis& axis : control.axes)
+        if (axis.law.field_orientation) return "has a winding, whose currents and speed act on each other";
+    return check_control(run.assembly(), control);
 }
 
-DriveBatch::DriveBatch(const std::vector<model::Train>& kinds, std::vector<int> kind_of, double step)
+DriveBatch::DriveBatch(std::vector<Scenario> kinds, std::vector<int> kind_of, double step)
     : kind_of_(std::move(kind_of)),
       step_(step),
       drives_(kind_of_.size()),
       inputs_(2 * kind_of_.size()),
-      shown_(states * kind_of_.size()) {
-    for (const model::Train& train : kinds) {
-        const DriveKind& made = *kinds_.emplace_back(std::make_unique<const DriveKind>(train));
-        numbers_.push_back(numbers_of(made, train, made.half_gap()));
+      shown_(states * kind_of_.size()),
+      control_of_(kind_of_),
+      instants_(kind_of_.size()),
+      times_(kind_of_.size()) {
+    std::vector<std::size_t> slots;
+    for (const Scenario& s : kinds) {
+        const DriveKind& made = *kinds_.emplace_back(std::make_unique<const DriveKind>(s.train));
+        numbers_.push_back(numbers_of(made, s.train, made.half_gap()));
+        controls_.push_back(s.control);
+        const std::vector<control::Axis> laws = s.control.laws();
+        slots.push_back(laws.empty() ? 0 : static_cast<std::size_t>(laws[0].slots()));
     }
+    slots_at_.push_back(0);
+    for (const int kind : kind_of_) slots_at_.push_back(slots_at_.back() + slots[static_cast<std::size_t>(kind)]);
+    slots_.resize(slots_at_.back());
+    const ScenarioSimulation first(kinds[0], step);
+    variables_ = std::make_unique<const Variables>(first.variables());
+    names_ = first.names();
 }
 
 DriveBatch::~DriveBatch() = default;
@@ -148,7 +169,7 @@ void DriveBatch::renew(std::size_t k) {
 }
 
 Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigned threads, LoadAnswer* answers) {
-    while (workers_.size() < Team::needed(size(), threads)) workers_.push_back(std::make_unique<Worker>());
+    while (workers_.size() < Team::needed(size(), threads)) add_worker();
     team_.share(size(), threads, [&](std::size_t begin, std::size_t end, std::size_t who) {
         step_range(begin, end, command, load_torque, answers, *workers_[who]);
     });
@@ -160,55 +181,137 @@ Failure DriveBatch::step(const Input& command, const Input& load_torque, unsigne
     return first;
 }
 
+DriveBatch::Worker& DriveBatch::add_worker() {
+    Worker& worker = *workers_.emplace_back(std::make_unique<Worker>());
+    for (const Control& control : controls_)
+        for (control::Axis& law : control.laws()) worker.laws.push_back(std::move(law));
+    return worker;
+}
+
 void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                             LoadAnswer* answers, Worker& worker) {
     for (std::size_t k = begin; k < end; ++k) {
         ++worker.counts.steps;
-        DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], command[k], load_torque[k]);
-        if (answers != nullptr) walk.differ(0.0, 1.0);
-        if (walk.advance(step_)) {
-            if (answers != nullptr)
-                answers[k] = {((walk.x.a - walk.x.v) - (drives_[k].a - drives_[k].v)) / step_, 0.0,
-                              (walk.tangent[2] - walk.tangent[1]) / step_};
-            drives_[k] = walk.x;
-            worker.counts.walked += walk.switchings > 0;
-            worker.counts.switchings += walk.switchings;
-        } else if (!solve(k, command[k], load_torque[k], answers == nullptr ? nullptr : answers + k, worker)) {
-            continue;
-        }
-        inputs_[2 * k] = command[k];
+        LoadAnswer* const answer = answers == nullptr ? nullptr : answers + k;
+        // The answer of a controller to what its encoders read is that of the general solver.
+        const bool walked = !controlled()
+                                ? walk(k, command[k], load_torque[k], answer, worker)
+                                : answer == nullptr && walk_under_control(k, command[k], load_torque[k], worker);
+        if (!walked && !solve(k, command[k], load_torque[k], answer, worker)) continue;
+        times_[k] += step_;
         inputs_[2 * k + 1] = load_torque[k];
         show(k);
     }
 }
 
-// By the general solver. False: the motion cannot go on.
-bool DriveBatch::solve(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker) {
-    ++worker.counts.general;
+// False: something was not certain.
+bool DriveBatch::walk(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker) {
+    DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], command, load_torque);
+    if (answer != nullptr) walk.differ(0.0, 1.0);
+    if (!walk.advance(step_)) return false;
+    if (answer != nullptr)
+        *answer = {((walk.x.a - walk.x.v) - (drives_[k].a - drives_[k].v)) / step_, 0.0,
+                   (walk.tangent[2] - walk.tangent[1]) / step_};
+    keep(k, walk, command, worker);
+    return true;
+}
+
+void DriveBatch::keep(std::size_t k, const DriveWalk& walk, double command, Worker& worker) {
+    drives_[k] = walk.x;
+    inputs_[2 * k] = command;
+    worker.counts.walked += walk.switchings > 0;
+    worker.counts.switchings += walk.switchings;
+}
+
+// The same from one sample instant of the controller to the next.
+bool DriveBatch::walk_under_control(std::size_t k, double reference, double load_torque, Worker& worker) {
+    control::Axis& law = worker.laws[static_cast<std::size_t>(control_of_[k])];
+    law.reference.pieces.assign(1, {times_[k], {reference}});
+    law.reference.sines.clear();
+    const Ticks instants{control(k).tick};
+    double* const slot = slots_.data() + slots_at_[k];
+    worker.slots.assign(slot, slot + slot_count(k));
+    const double end = times_[k] + step_;
+    std::int64_t next = instants_[k];
+    double command = inputs_[2 * k];
+    DriveWalk walk(kind(k).laws(), numbers(k), drives_[k], command, load_torque);
+    bool well = true;
+    for (double time = times_[k]; well && time != end;) {
+        const double instant = instants.time(next);
+        if (instants.before(time, instant)) {
+            const double until = instants.before(instant, end) ? instant : end;
+            well = walk.advance(until - time);
+            time = until;
+            continue;
+        }
+        const control::Sampled y = sampled(k, walk, time);
+        if (next == 0) law.start(y, instants.length, slot);
+        well = law.step(next++, instants.length, y, slot);
+        walk.set_command(command = law.command(slot));
+    }
+    if (well) {
+        keep(k, walk, command, worker);
+        instants_[k] = next;
+    } else {
+        std::ranges::copy(worker.slots, slot);
+    }
+    return well;
+}
+
+// What the encoders read, and what the motor gives under its last command.
+control::Sampled DriveBatch::sampled(std::size_t k, const DriveWalk& walk, double time) const {
+    const ControlledAxis& axis = control(k).axes[0];
+    const DriveState& x = walk.x;
+    const DriveNumbers& p = numbers(k);
+    const double angles[] = {ratio(k) * (x.angle + x.d), x.angle}, speeds[] = {ratio(k) * x.a, x.a - x.v};
+    const double torque = kind(k).laws().delays_torque ? x.q : p.stall_torque * walk.command - p.back_torque * x.a;
+    return {angles[axis.position_shaft],
+            angles[axis.speed_shaft],
+            speeds[axis.speed_shaft],
+            p.turned * torque,
+            angles[0],
+            speeds[0],
+            angles[axis.reference_shaft],
+            time};
+}
+
+// The general solver of a drive, which goes on being kept while others need one more.
+ScenarioSimulation& DriveBatch::solver(std::size_t k, Worker& worker) const {
     const std::size_t number = each_its_own_ ? k : static_cast<std::size_t>(kind_of_[k]);
     auto kept = std::ranges::find(worker.solvers, number, &Worker::Kept::number);
     if (kept == worker.solvers.end()) {
         if (worker.solvers.size() == most_solvers)
             worker.solvers.erase(std::ranges::min_element(worker.solvers, {}, &Worker::Kept::used));
-        worker.solvers.push_back({number, 0, std::make_unique<TrainSimulation>(train_of(k), step_)});
+        worker.solvers.push_back(
+            {number, 0, std::make_unique<ScenarioSimulation>(stepped_scenario(train_of(k), control(k)), step_)});
         kept = worker.solvers.end() - 1;
     }
     kept->used = ++worker.clock;
-    TrainSimulation& simulation = *kept->simulation;
-    const model::Assembly& a = simulation.assembly();
+    return *kept->simulation;
+}
+
+// Where the general solver has the state of a drive, as it is now.
+void DriveBatch::give_state(std::size_t k, ScenarioSimulation& simulation, Worker& worker) const {
+    const model::Assembly& a = simulation.train().assembly();
     const model::Layout& n = a.layout();
     const model::Places& places = a.places();
     const model::GearPlace& gear = places.gears[0];
     const model::ShaftPlace &first = places.shafts[0], &last = places.shafts[1];
-    const auto at = [](auto& list, int place) -> auto& { return list[static_cast<std::size_t>(place)]; };
     const DriveNumbers& p = numbers(k);
     const int torque = places.motors[0].torque, limit = places.motors[0].branch, zero = kind(k).laws().zero;
     const int locked = gear.contact == model::nowhere ? model::nowhere : at(places.contacts, gear.contact).locked;
-    DriveState& x = drives_[k];
+    const DriveState& x = drives_[k];
     MotionState& s = worker.state;
     s.clear();
+    s.time = times_[k];
     s.x.resize(static_cast<std::size_t>(n.states));
     s.memory.resize(static_cast<std::size_t>(n.memory));
+    s.input.assign(inputs_.begin() + static_cast<std::ptrdiff_t>(2 * k),
+                   inputs_.begin() + static_cast<std::ptrdiff_t>(2 * k) + n.inputs);
+    s.control.next = instants_[k];
+    if (instants_[k] > 0)
+        s.control.slots.assign(slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k]),
+                               slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k + 1]));
     if (torque != model::nowhere) at(s.x, torque) = p.turned * x.q;
     at(s.x, first.speed) = ratio(k) * x.a;
     at(s.x, last.speed) = x.a - x.v;
@@ -229,39 +332,54 @@ bool DriveBatch::solve(std::size_t k, double command, double load_torque, LoadAn
         if (limit != model::nowhere)
             at(s.key.branch, limit) = static_cast<std::int16_t>(inputs_[2 * k] > p.command_limit) -
                                       static_cast<std::int16_t>(inputs_[2 * k] < -p.command_limit);
-        s.rate_input.assign(inputs_.begin() + static_cast<std::ptrdiff_t>(2 * k),
-                            inputs_.begin() + static_cast<std::ptrdiff_t>(2 * k) + n.inputs);
+        s.rate_input = s.input;
     } else if (locked != model::nowhere && gear.twist != model::nowhere) {
         at(s.memory, locked) = a.train().gears[0].law.curve.torque(x.d);
     }
     simulation.motion().restore(s);
-    const std::array<double, 2> both{command, load_torque};
-    const auto inputs = std::span(both).first(static_cast<std::size_t>(n.inputs));
+}
+
+// By the general solver. False: the motion cannot go on.
+bool DriveBatch::solve(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker) {
+    ++worker.counts.general;
+    ScenarioSimulation& simulation = solver(k, worker);
+    give_state(k, simulation, worker);
+    const std::array<double, 2> both{controlled() ? load_torque : command, controlled() ? command : load_torque};
     const Status status = answer == nullptr
-                              ? simulation.motion().advance(step_, inputs, inputs)
-                              : simulation.motion().answer(step_, inputs, inputs, *simulation.load_shaft(1), *answer);
+                              ? simulation.advance(step_, both, both)
+                              : simulation.answer(step_, both, both, *simulation.train().load_shaft(1), *answer);
     if (status != Status::done) {
-        const Motion& m = simulation.motion();
-        worker.failure.add({k, train_status_text(a, status, m.time(), m.stopped_at(), m.too_many_guards())});
+        worker.failure.add({k, simulation.text(status)});
         return false;
     }
+    const model::Places& places = simulation.train().assembly().places();
+    const model::GearPlace& gear = places.gears[0];
+    const model::ShaftPlace &first = places.shafts[0], &last = places.shafts[1];
+    const int torque = places.motors[0].torque;
+    const int locked = gear.contact == model::nowhere ? model::nowhere : at(places.contacts, gear.contact).locked;
+    const DriveNumbers& p = numbers(k);
+    DriveState& x = drives_[k];
+    MotionState& s = worker.state;
     simulation.motion().save(s);
     if (torque != model::nowhere) x.q = p.turned * at(s.x, torque);
     x.a = at(s.x, first.speed) / ratio(k);
     x.v = x.a - at(s.x, last.speed);
     if (gear.twist != model::nowhere) x.d = at(s.x, gear.twist);
-    x.angle = at(s.x, n.coupled);
+    x.angle = at(s.x, simulation.train().assembly().layout().coupled);
     if (gear.hysteresis != model::nowhere) x.hysteresis = at(s.memory, gear.hysteresis);
     if (locked != model::nowhere) x.held = at(s.memory, locked);
     x.known = true;
     if (first.contact != model::nowhere) x.motor = static_cast<signed char>(p.turned * at(s.key.modes, first.contact));
     if (gear.contact != model::nowhere) x.twist = at(s.key.modes, gear.contact);
     if (last.contact != model::nowhere) x.load = at(s.key.modes, last.contact);
-    if (gear.piece != model::nowhere) x.piece = static_cast<short>(at(s.key.branch, gear.piece) + zero);
+    if (gear.piece != model::nowhere) x.piece = static_cast<short>(at(s.key.branch, gear.piece) + kind(k).laws().zero);
     if (gear.flanks != model::nowhere) x.flanks = static_cast<signed char>(at(s.key.branch, gear.flanks));
     if (gear.cell != model::nowhere) x.cell = at(s.key.branch, gear.cell);
     if (gear.cell_back != model::nowhere) x.back = at(s.key.branch, gear.cell_back);
     if (gear.contact != model::nowhere && x.twist == 0) x.v = 0.0;
+    inputs_[2 * k] = controlled() ? s.input[0] : command;
+    instants_[k] = s.control.next;
+    std::ranges::copy(s.control.slots, slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k]));
     return true;
 }
 
@@ -269,7 +387,9 @@ void DriveBatch::reset(const bool* which, const double* start) {
     for (std::size_t k = 0; k < size(); ++k) {
         if (which != nullptr && !which[k]) continue;
         DriveState& x = drives_[k] = {};
-        inputs_[2 * k] = inputs_[2 * k + 1] = 0.0;
+        inputs_[2 * k] = inputs_[2 * k + 1] = times_[k] = 0.0;
+        instants_[k] = 0;
+        std::fill_n(slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k]), slot_count(k), 0.0);
         if (start != nullptr) {
             const double* from = start + k * states;
             x.q = numbers(k).turned * from[0];
@@ -285,6 +405,9 @@ void DriveBatch::reset(const bool* which, const double* start) {
 void DriveBatch::restore(const Snapshot& s) {
     drives_ = s.drives;
     inputs_ = s.inputs;
+    instants_ = s.instants;
+    times_ = s.times;
+    slots_ = s.slots;
     for (std::size_t k = 0; k < size(); ++k) {
         drives_[k].known = drives_[k].known && s.changes == changes_;
         show(k);
@@ -323,9 +446,26 @@ void DriveBatch::read_twist_contact(std::int8_t* out) const {
     for (std::size_t k = 0; k < size(); ++k) out[k] = drives_[k].twist;
 }
 
+void DriveBatch::read_variable(std::size_t variable, double* out) {
+    if (workers_.empty()) add_worker();
+    Worker& worker = *workers_[0];
+    worker.values.resize(variables().size());
+    for (std::size_t k = 0; k < size(); ++k) {
+        if (variable >= variables().first_shown()) {
+            const int signal = variables().shown()[variable - variables().first_shown()].signal;
+            out[k] = control::Axis::signal(signal, slots_.data() + slots_at_[k]);
+            continue;
+        }
+        ScenarioSimulation& simulation = solver(k, worker);
+        give_state(k, simulation, worker);
+        out[k] = simulation.read(worker.values.data()) == Status::done ? worker.values[variable] : 0.0;
+    }
+}
+
 std::size_t DriveBatch::memory() const {
-    return size() * (sizeof(DriveState) + sizeof(int) + (2 + states + own_.size()) * sizeof(double)) +
-           numbers_.size() * sizeof(DriveNumbers);
+    const std::size_t each = sizeof(DriveState) + 2 * sizeof(int) + sizeof(std::size_t) + sizeof(std::int64_t) +
+                             (3 + states + own_.size()) * sizeof(double);
+    return size() * each + numbers_.size() * sizeof(DriveNumbers) + slots_.size() * sizeof(double);
 }
 
 }  // namespace lostmotion::batch

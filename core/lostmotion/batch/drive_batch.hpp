@@ -1,8 +1,8 @@
 // Many drives at once, all advanced by the same step, with inputs that are constant over it.
 //
-// Each drive is stepped by the walk of `drive_walk.hpp`. Whatever is not certain there is left to the general solver,
-// which repeats the step from where it began. A drive does not know of the others, so its bits do not depend on their
-// number, on their order or on threads.
+// Each drive is stepped by the walk of `drive_walk.hpp`, from one sample instant of its controller to the next.
+// Whatever is not certain there is left to the general solver, which repeats the step from where it began. A drive does
+// not know of the others, so its bits do not depend on their number, on their order or on threads.
 #pragma once
 
 #include <cstdint>
@@ -11,7 +11,7 @@
 #include <string>
 #include <vector>
 
-#include "../simulation/train_stepping.hpp"
+#include "../scenario/simulation.hpp"
 #include "drive_numbers.hpp"
 #include "input.hpp"
 #include "team.hpp"
@@ -35,22 +35,23 @@ struct Counts {
 
 class DriveBatch {
  public:
-    // kind_of: of each drive its kind. step: [s].
-    DriveBatch(const std::vector<model::Train>& kinds, std::vector<int> kind_of, double step);
+    // kind_of: of each drive its kind. step: [s]. A controller stays that of the drive's kind, whatever becomes of its
+    // train.
+    DriveBatch(std::vector<Scenario> kinds, std::vector<int> kind_of, double step);
     ~DriveBatch();
     DriveBatch(const DriveBatch&) = delete;
     DriveBatch& operator=(const DriveBatch&) = delete;
 
-    // What keeps a train from being stepped in such a batch, or nothing.
-    static std::string error(const model::Train& train);
+    // What keeps a train and its controllers from being stepped in such a batch, or nothing.
+    static std::string error(const model::Train& train, const Control& control);
 
     std::size_t size() const { return drives_.size(); }
     // Sets a parameter of all drives, by its key; it acts from the next step on. False: there is none of this key.
     bool set(const std::string& key, const double* values);
     // Gives one drive a train of its own, which `error` has passed; it goes on from the state that it is in.
     void replace(std::size_t k, const model::Train& train);
-    // Advances all drives. Those that cannot go on stay where they were; the first of them is reported. answers: of
-    // each drive how it answers its load torque, or nullptr.
+    // Advances all drives. Those that cannot go on stay where they were; the first of them is reported. command: of a
+    // drive with a controller its reference. answers: of each drive how it answers its load torque, or nullptr.
     Failure step(const Input& command, const Input& load_torque, unsigned threads, LoadAnswer* answers = nullptr);
     double load_inertia(std::size_t k) const { return 1.0 / numbers(k).per_load; }
     // To t = 0. which: for each drive whether it is meant; nullptr: all. start: of each drive its states; nullptr:
@@ -66,14 +67,21 @@ class DriveBatch {
     // The modes of a contact: 0 stuck, +1 or -1 slipping, also where there is none.
     void read_input_contact(std::int8_t* out) const;
     void read_twist_contact(std::int8_t* out) const;
+    // All variables of a run, of which controllers show the last ones, and their values. Those of a train take the
+    // general solver.
+    const Variables& variables() const { return *variables_; }
+    const ScenarioSimulation::Names& names() const { return names_; }
+    void read_variable(std::size_t variable, double* out);
 
     struct Snapshot {
         const DriveBatch* of;
         std::vector<DriveState> drives;
         std::vector<double> inputs;
         long changes;
+        std::vector<std::int64_t> instants;
+        std::vector<double> times, slots;
     };
-    Snapshot snapshot() const { return {this, drives_, inputs_, changes_}; }
+    Snapshot snapshot() const { return {this, drives_, inputs_, changes_, instants_, times_, slots_}; }
     void restore(const Snapshot& s);
 
     const Counts& counts() const { return counts_; }
@@ -87,10 +95,20 @@ class DriveBatch {
         std::vector<double> values;
     };
 
+    Worker& add_worker();
     void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                     LoadAnswer* answers, Worker& worker);
+    bool walk(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker);
+    void keep(std::size_t k, const DriveWalk& walk, double command, Worker& worker);
+    bool walk_under_control(std::size_t k, double reference, double load_torque, Worker& worker);
+    control::Sampled sampled(std::size_t k, const DriveWalk& walk, double time) const;
     bool solve(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker);
+    ScenarioSimulation& solver(std::size_t k, Worker& worker) const;
+    void give_state(std::size_t k, ScenarioSimulation& simulation, Worker& worker) const;
     model::Train train_of(std::size_t k) const;
+    const Control& control(std::size_t k) const { return controls_[static_cast<std::size_t>(control_of_[k])]; }
+    bool controlled() const { return slots_at_.back() > 0; }
+    std::size_t slot_count(std::size_t k) const { return slots_at_[k + 1] - slots_at_[k]; }
     double half_gap_of(std::size_t k) const;
     void renew(std::size_t k);
     void spread_numbers();
@@ -115,6 +133,14 @@ class DriveBatch {
     std::map<int, int> other_gap_;         // kinds with a gap in place of those without, and the other way
     long changes_ = 0;                     // of numbers
     std::map<std::size_t, int> replaced_;  // kinds of drives that have a train of their own
+    std::vector<Control> controls_;        // of each kind that was given
+    std::vector<int> control_of_;          // of each drive one of them
+    std::vector<std::size_t> slots_at_;    // of each drive where its controller's memory begins, and the end
+    std::vector<double> slots_;
+    std::vector<std::int64_t> instants_;  // of each drive the next sample instant of its controller
+    std::vector<double> times_;           // [s]
+    std::unique_ptr<const Variables> variables_;
+    ScenarioSimulation::Names names_;
     std::vector<std::unique_ptr<Worker>> workers_;
     Team team_;
     Counts counts_;

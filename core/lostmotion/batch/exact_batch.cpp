@@ -45,9 +45,8 @@ Failure ExactBatch::step(std::span<const Input> inputs, const std::optional<Moti
 
 bool ExactBatch::replace(std::size_t k, const Scenario& scenario) {
     auto made = std::make_unique<ScenarioSimulation>(scenario, step_);
-    MotionState now;
-    drives_[k]->motion().save(now);
-    if (made->names().states != states() || !made->restore(now)) return false;
+    if (made->state_size() != drives_[k]->state_size() || made->names().states != states()) return false;
+    made->go_on_from(*drives_[k]);
     drives_[k] = std::move(made);
     return true;
 }

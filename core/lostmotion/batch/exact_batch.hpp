@@ -20,7 +20,7 @@ class ExactBatch {
 
     std::size_t size() const { return drives_.size(); }
     const std::vector<std::string>& inputs() const { return drives_[0]->names().inputs; }
-    const std::vector<Variable>& variables() const { return drives_[0]->variables().all(); }
+    const Variables& variables() const { return drives_[0]->variables(); }
 
     // At the end of a step, of the shaft whose motion is given.
     struct Motion {

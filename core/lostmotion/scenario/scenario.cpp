@@ -2,6 +2,16 @@
 
 namespace lostmotion {
 
+Scenario stepped_scenario(const model::Train& train, const Control& control) {
+    Scenario s;
+    s.train = train;
+    s.control = control;
+    s.references_given = true;
+    s.start.resize(static_cast<std::size_t>(model::Assembly(train).layout().states));
+    s.hysteresis_capacities.resize(train.gears.size());
+    return s;
+}
+
 TrainStart train_start(const model::Assembly& a, std::span<const double> states, std::span<const double> capacities) {
     TrainStart start;
     const std::vector<std::string> names = model::state_names(a);

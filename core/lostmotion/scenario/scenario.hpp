@@ -44,6 +44,9 @@ void describe(F& f, Scenario& s) {
     f.number("sample_interval", s.sample_interval, Range::positive);
 }
 
+// A train from rest that is stepped, whose controllers are given their references; nothing acts on it.
+Scenario stepped_scenario(const model::Train& train, const Control& control = {});
+
 // States and capacities in their order as a start by name.
 TrainStart train_start(const model::Assembly& a, std::span<const double> states, std::span<const double> capacities);
 

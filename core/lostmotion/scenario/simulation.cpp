@@ -241,15 +241,6 @@ double ScenarioSimulation::next_breakpoint(double time) const {
     return next;
 }
 
-auto ScenarioSimulation::of_train(const model::Train& train) -> Scenario {
-    Scenario s;
-    s.train = train;
-    const model::Assembly a(train);
-    s.start.resize(static_cast<std::size_t>(a.layout().states));
-    s.hysteresis_capacities.resize(train.gears.size());
-    return s;
-}
-
 void ScenarioSimulation::name_all(const Scenario& scenario) {
     names_.states = model::state_names(train_.assembly());
     for (const model::Gear& g : scenario.train.gears) names_.capacities.push_back(g.name);

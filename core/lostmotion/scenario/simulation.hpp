@@ -23,7 +23,7 @@ class ScenarioSimulation {
     // The scenario has passed its check. It begins at its start.
     ScenarioSimulation(const Scenario& scenario, double step);
     // A train that has passed its check, from rest.
-    ScenarioSimulation(const model::Train& train, double step) : ScenarioSimulation(of_train(train), step) {}
+    ScenarioSimulation(const model::Train& train, double step) : ScenarioSimulation(stepped_scenario(train), step) {}
 
     struct Names {
         std::vector<std::string> states, inputs, capacities;
@@ -141,7 +141,6 @@ class ScenarioSimulation {
     double next_breakpoint(double time) const;
     static Signal no_rate() { return {{}, {}}; }
 
-    static Scenario of_train(const model::Train& train);
     void name_all(const Scenario& scenario);
 
     void name_reference(const Scenario& scenario, const ControlledAxis& axis);

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from .. import _core
+from ..control.axis import OPEN_LOOP
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Time
@@ -86,7 +87,7 @@ class Drives:
         core = scenario.core(loaded=list(scenario.tables.shafts)[-1:], given=())
         if scenario.axes() or scenario.continuous():
             raise InputError("drive: a controller turns the motor; give the drive alone, scenario.drive()")
-        if error := _core.DriveBatch.error(core):
+        if error := _core.DriveBatch.error(core, OPEN_LOOP):
             raise InputError(f"drive: {error}")
         laws = _core.DriveBatch.laws(core)
         try:

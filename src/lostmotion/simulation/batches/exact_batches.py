@@ -41,7 +41,7 @@ class ExactBatch:
             if key not in kinds:
                 kinds[key] = len(kinds)
                 trains.append(_train_of(one, given))
-                controls.append(_control_of(base))
+                controls.append(control_of(base))
             kind_of.append(kinds[key])
         self._core = _core.ExactBatch(trains, controls=controls, kind_of=kind_of, step=step)
         self._given, self._count, self._steps = given, len(kind_of), 0
@@ -66,7 +66,7 @@ class ExactBatch:
         """Take over what has been written under some keys for some trains."""
         for k in rows.tolist():
             one = parameters.scenario(k)
-            if not self._core.replace(k, _train_of(one, self._given), _control_of(self._tuned[k])):
+            if not self._core.replace(k, _train_of(one, self._given), control_of(self._tuned[k])):
                 raise InputError(
                     "adds or removes a part that has states; take a batch of its own", f"parameters.{keys[0]}"
                 )
@@ -140,6 +140,6 @@ def _train_of(scenario: Scenario, shaft: str | None) -> _core.Train:
     return scenario.core(loaded=loaded, given=(shaft,))
 
 
-def _control_of(scenario: Scenario) -> Any:
+def control_of(scenario: Scenario) -> Any:
     """Its controllers, as the core takes them."""
     return scenario.control() if scenario.axes() else OPEN_LOOP

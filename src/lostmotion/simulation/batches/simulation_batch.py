@@ -90,7 +90,7 @@ class SimulationBatch:
     -----
     Each step is exact, whatever its length: `switchings` within it are located to rounding. A drive does not know of the
     others, so its results do not depend on their number, on their order or on `threads`, to the last bit. A motor, a gear and a
-    load without controllers are stepped by a walk that needs no tables, all others by the solver of `Simulation`.
+    load, with a sampled controller or without, are stepped by a walk that needs no tables, all others by the solver of `Simulation`.
     """
 
     @checked
@@ -175,6 +175,11 @@ class SimulationBatch:
     def inputs(self) -> tuple[str, ...]:
         """Names of what is given to `step`."""
         return self._core.inputs
+
+    @property
+    def variables(self) -> tuple[str, ...]:
+        """Names of the variables, each of which ``batch[name]`` returns."""
+        return self._core.variables
 
     @checked
     def step(
@@ -345,11 +350,12 @@ class SimulationBatch:
     def __getitem__(self, name: str) -> np.ndarray:
         """Values of a variable (SI), one for each drive.
 
-        Of a motor, a gearbox and a load without controllers, the states ``motor_speed``, ``load_speed``, ``twist`` and
-        ``load_angle`` are the memory that each step writes anew. It exports DLPack, so that
-        ``torch.from_dlpack(batch["twist"])`` copies nothing. Copy it to keep it. ``motor_torque``, ``output_torque``,
-        ``input_contact`` and ``twist_contact`` are new arrays. Of other trains all result variables are such memory, among
-        them what the controllers show.
+        The states ``motor_speed``, ``load_speed``, ``twist`` and ``load_angle`` of a motor, a gearbox and a load are the
+        memory that each step writes anew. It exports DLPack, so that ``torch.from_dlpack(batch["twist"])`` copies nothing.
+        Copy it to keep it. The other variables of such drives are new arrays. ``motor_torque``, ``output_torque``,
+        ``input_contact``, ``twist_contact`` and the signals of controllers cost little; the rest, such as ``efficiency``, is
+        computed by the solver of `Simulation` when it is read. All variables of other trains are memory that each step
+        writes anew.
         """
         if name in self._core.variables:
             return self._core.read(name)

@@ -1,4 +1,7 @@
-"""Trains of a batch that are a motor, a gear and a load: a walk from event to event, which begins anew at each step."""
+"""Trains of a batch that are a motor, a gear and a load: a walk from event to event, which begins anew at each step.
+
+Sampled controllers run at their sample instants, between which the walk steps.
+"""
 
 from __future__ import annotations
 
@@ -14,6 +17,7 @@ from ..forms.dotted_keys import renamed
 from ..scenario.one_gear import drive_keys
 from ..scenario.scenario import Scenario
 from .batch_parameters import BatchParameters
+from .exact_batches import control_of
 
 BACKLASH = "gearbox.stiffness.backlash"
 KEYS = tuple(
@@ -41,7 +45,10 @@ class WalkedBatch:
         numbers: dict[Scenario, int] = {}
         kinds = [numbers.setdefault(one, len(numbers)) for one in scenarios]
         self._core = _core.DriveBatch(
-            [_core_of(one) for one in numbers], kind_of=kinds if len(kinds) == count else kinds * count, step=step
+            [_core_of(one) for one in numbers],
+            controls=[control_of(one) for one in numbers],
+            kind_of=kinds if len(kinds) == count else kinds * count,
+            step=step,
         )
         self._first, self._numbers = first, drive_keys(first)
         self.change(parameters, tuple(parameters), np.arange(count))
@@ -64,15 +71,18 @@ class WalkedBatch:
         self._rigid = any(isinstance(g.stiffness, Rigid) for one in numbers for g in one.train().gears.values())
         self._angle = states[-1]
         self._count = count
-        self._given = train.variable(motor, "command"), train.variable(output, "load_torque")
-        self.inputs = self._given if first.loaded() else self._given[:1]
+        self._numbers_of_variables = {name: k for k, name in enumerate(self._core.variables)}
+        load = train.variable(output, "load_torque")
+        (command,) = (name for name in self._core.inputs if name != load)
+        self._given = command, load
+        self.inputs = tuple(name for name in self._core.inputs if name != load or first.loaded())
 
     @staticmethod
     def takes(scenarios: Sequence[Scenario]) -> bool:
         """Whether the core takes these trains."""
-        if any(scenario.axes() or scenario.continuous() for scenario in scenarios):
+        if any(scenario.continuous() for scenario in scenarios):
             return False
-        return not any(_core.DriveBatch.error(_core_of(scenario)) for scenario in dict.fromkeys(scenarios))
+        return not any(_error(scenario, scenario) for scenario in dict.fromkeys(scenarios))
 
     def change(self, parameters: BatchParameters, keys: Sequence[str], rows: np.ndarray) -> None:
         """Take over what has been written under some keys for some trains."""
@@ -82,10 +92,10 @@ class WalkedBatch:
                 self._core.set(number, parameters[key])
             return
         for k in rows.tolist():
-            one = _core_of(parameters.scenario(k))
-            if error := _core.DriveBatch.error(one):
+            one = parameters.scenario(k)
+            if error := _error(one, self._first):
                 raise InputError(f"{error}; such drives have a batch of their own", f"parameters.{keys[0]}")
-            self._core.replace(k, one)
+            self._core.replace(k, _core_of(one))
 
     def _is_number_of_core(self, key: str) -> bool:
         """Whether the core changes this number by itself. Of a synchronous motor its numbers follow from others."""
@@ -98,7 +108,7 @@ class WalkedBatch:
     @property
     def variables(self) -> tuple[str, ...]:
         """Names of its variables."""
-        return tuple(dict.fromkeys((*self.states, *self._computed)))
+        return tuple(dict.fromkeys((*self.states, *self._computed, *self._numbers_of_variables)))
 
     @property
     def states(self) -> tuple[str, ...]:
@@ -106,9 +116,10 @@ class WalkedBatch:
         return tuple(self._states)
 
     def read(self, name: str) -> np.ndarray:
-        """Values of a variable; outputs of states are written anew by each step."""
-        computed = self._computed.get(name)
-        return self._states[name] if computed is None else computed()
+        """Values of a variable; each step writes anew the values of states."""
+        if name in self._computed:
+            return self._computed[name]()
+        return self._states[name] if name in self._states else self._core.read(self._numbers_of_variables[name])
 
     @property
     def counts(self) -> tuple[int, int, int, int]:
@@ -151,6 +162,11 @@ class WalkedBatch:
 def _core_of(scenario: Scenario) -> _core.Train:
     """The solver's train, where nothing else than a load torque acts on the last shaft."""
     return scenario.core(loaded=list(scenario.tables.shafts)[-1:], given=())
+
+
+def _error(scenario: Scenario, tuned: Scenario) -> str:
+    """What keeps the core from stepping a train, or nothing."""
+    return _core.DriveBatch.error(_core_of(scenario), control_of(tuned))
 
 
 def _plain(stiffness: Any) -> bool:
