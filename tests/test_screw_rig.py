@@ -35,14 +35,14 @@ def screw(**values) -> lm.model.Screw:
 def test_stiffness_drag_and_efficiency_come_back() -> None:
     rig = ScrewRig(screw(stiffness=2e8, efficiency=0.9, backdriving_efficiency=0.7, drag_torque=0.1), load=1000.0)
     # A slow ramp is not infinitely slow; of the drag the slide's own inertia takes 1e-8.
-    assert rig.stiffness() == pytest.approx([2e8], rel=1e-9)
+    assert rig.stiffness([], 1000.0) == pytest.approx([2e8], rel=1e-9)
     assert rig.drag_torque(100.0) == pytest.approx(0.1, rel=1e-6)
     for share in (1.0, 0.1):
-        assert rig.efficiency(share) == pytest.approx(0.9, rel=1e-8)
-        assert rig.efficiency(-share) == pytest.approx(0.7, rel=1e-8)
+        assert rig.efficiency(10.0, share) == pytest.approx(0.9, rel=1e-8)
+        assert rig.efficiency(10.0, -share) == pytest.approx(0.7, rel=1e-8)
     # T = F p/(2 pi eta) + T_0; F = T_0 2 pi/(p eta_b). The force leads the deflection by its damping: 0.02 N in 90 N.
-    assert rig.starting_torque() == pytest.approx(1000.0 * TRAVEL / 0.9 + 0.1, rel=1e-6)
-    assert rig.backdriving_force() == pytest.approx(0.1 / (TRAVEL * 0.7), rel=1e-3)
+    assert rig.starting_torque(1.0) == pytest.approx(1000.0 * TRAVEL / 0.9 + 0.1, rel=1e-6)
+    assert rig.backdriving_torque() == pytest.approx(0.1 / (TRAVEL * 0.7), rel=1e-3)
 
 
 def test_lost_motion_is_the_play_and_the_deflection_both_ways() -> None:
@@ -56,7 +56,7 @@ def test_nut_bearing_and_screw_are_in_series() -> None:
     part = screw(nut_stiffness=4e8, bearing_stiffness=2e8, supported_length=0.5, core_diameter=0.02, support="both ends")
     bar = 4 * 206e9 * math.pi / 4 * 0.02**2 / 0.5
     series = 1 / (1 / 4e8 + 1 / 2e8 + 1 / bar)
-    assert ScrewRig(part, load=1000.0).stiffness() == pytest.approx([series], rel=1e-9)
+    assert ScrewRig(part, load=1000.0).stiffness([], 1000.0) == pytest.approx([series], rel=1e-9)
 
 
 def test_each_segment_of_a_stiffness_curve_is_measured() -> None:
@@ -70,11 +70,11 @@ def test_hysteresis_opens_the_loop_and_a_pitch_error_is_seen_over_a_turn() -> No
     rig = ScrewRig(screw(stiffness=1e8, pitch_error=error), load=1000.0)
     # By straight lines that depart from the sine by 0.1 % at most.
     assert rig.pitch_error() == pytest.approx(4e-6, rel=2e-3)
-    assert rig.efficiency(1.0) == pytest.approx(1.0, rel=1e-8)
+    assert rig.efficiency(10.0, 1.0) == pytest.approx(1.0, rel=1e-8)
 
 
 def test_a_self_locking_screw_is_not_driven_back_and_a_rigid_one_has_no_deflection() -> None:
-    assert ScrewRig(screw(stiffness=1e8, efficiency=0.3), load=1000.0).backdriving_force() is None
+    assert ScrewRig(screw(stiffness=1e8, efficiency=0.3), load=1000.0).backdriving_torque() is None
     rigid = lm.test_rig.measure_screw(screw(efficiency=0.9, drag_torque=0.1, viscous_friction=1e-3))
     assert rigid.first_loading is None and rigid.loops == () and rigid.stiffness == () and rigid.lost_motion == 0.0
     # The flywheel loses 2e-6 of its speed.

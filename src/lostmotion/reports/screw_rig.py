@@ -7,7 +7,8 @@ from collections.abc import Iterable
 import numpy as np
 
 from ..data_sheets.linear_sheets import ScrewSheet
-from ..test_rig.screw_measurement import RATED, ScrewReport
+from ..test_rig.screw_measurement import ScrewReport
+from ..test_rig.screw_rig import RATED
 from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import RPM
 from ..verdict import Verdict

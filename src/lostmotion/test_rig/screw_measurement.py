@@ -14,14 +14,14 @@ from ..inputs.quantities import Force
 from ..model.linear import ScrewData
 from ..units.practical import RPM
 from .comparison import Comparison
-from .screw_rig import ScrewRig
+from .screw_rig import RATED, ScrewRig
 from .torsion_loop import Loop
 
 T = TypeVar("T")
 
 SHARES = (0.05, 0.1, 0.2, 0.35, 0.5, 0.75, 1.0)  # of the load
 TURNING = tuple(n / RPM for n in (30.0, 100.0, 300.0, 1000.0, 2000.0, 3000.0))  # [rad/s]
-RATED = 1000.0 / RPM  # [rad/s] at which the drag is compared
+MOVING = 10.0  # [rad/s] at which the efficiency is measured
 LOOPS = (1.0, 0.6, 0.3)
 DEFAULT_LOAD = 1000.0  # [N] of a screw whose capacity is not known
 WORK = 2 * len(SHARES) + len(TURNING) + len(LOOPS) + 6  # how often `measure_screw` reports progress
@@ -103,7 +103,8 @@ def measure_screw(
     >>> [round(k / 1e6, 3) for k in report.stiffness], round(1e6 * report.lost_motion, 3)
     ([200.0], 5.3)
     """
-    rig = ScrewRig(screw, load=rig_load(sheet) if load is None else load)
+    load = rig_load(sheet) if load is None else load
+    rig = ScrewRig(screw, load=load)
 
     def done(measured: T) -> T:
         progress()
@@ -112,20 +113,20 @@ def measure_screw(
     breaks = _forces_at_breaks(screw)
     report = ScrewReport(
         screw=screw,
-        load=rig.load,
+        load=load,
         efficiency=(
             np.array(SHARES),
-            np.array([done(rig.efficiency(share)) for share in SHARES]),
-            np.array([done(rig.efficiency(-share)) for share in SHARES]),
+            np.array([done(rig.efficiency(MOVING, share)) for share in SHARES]),
+            np.array([done(rig.efficiency(MOVING, -share)) for share in SHARES]),
         ),
         drag=(np.array(TURNING), np.array([done(rig.drag_torque(speed)) for speed in TURNING])),
-        first_loading=done(None if rig.rigid else rig.first_loading(rig.load)),
-        loops=tuple(done(rig.loop(share * rig.load)) for share in LOOPS if not rig.rigid),
-        stiffness=tuple(done([] if rig.rigid else rig.stiffness(breaks))),
+        first_loading=done(None if rig.rigid else rig.initial_loading_curve(load)),
+        loops=tuple(done(rig.loop(share * load)) for share in LOOPS if not rig.rigid),
+        stiffness=tuple(done([] if rig.rigid else rig.stiffness(breaks, max(load, 1.5 * max(breaks, default=0.0))))),
         lost_motion=done(rig.lost_motion()),
         pitch_error=done(rig.pitch_error()),
-        starting_torque=done(rig.starting_torque()),
-        backdriving_force=done(rig.backdriving_force()),
+        starting_torque=done(rig.starting_torque(1.0)),
+        backdriving_force=done(rig.backdriving_torque()),
     )
     if sheet is None:
         return report
@@ -178,10 +179,5 @@ def _compliance(rig: ScrewRig, report: ScrewReport, sheet: ScrewSheet) -> Iterat
             yield Comparison(what, "N/µm", 1e-6 * value, 1e-6 * report.stiffness[k], remark)
     if sheet.backlash > 0.0:
         changed = "" if rig.screw.backlash == sheet.backlash else "another backlash is given"
-        play = rig.backlash(_first_segment(rig))
+        play = rig.backlash(next(iter(_forces_at_breaks(rig.screw)), report.load))
         yield Comparison("axial play", "µm", 1e6 * sheet.backlash, 1e6 * play, changed)
-
-
-def _first_segment(rig: ScrewRig) -> float:
-    """The force up to which the first segment is loaded."""
-    return next(iter(_forces_at_breaks(rig.screw)), rig.load)

@@ -1,4 +1,4 @@
-"""Virtual test rig: what manufacturers measure of a gearbox, measured on the simulated one.
+"""Virtual test rig: what manufacturers measure of a gearbox or a screw, measured on the simulated one.
 
 Nothing here reads the loss map or the torsion curve. Every value is measured in a simulated run, as on the rigs of
 figures 6 to 8 of the paper.
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
 
 FLYWHEEL = 1e9  # [kg m2] on the input: keeps its speed, or stays at rest, whatever the gearbox does
 LARGE_TORQUE = 100.0  # at the input [N·m]
-RIG_FREQUENCY = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
 SETTLING = 4.0  # [s] until a steady state is read
 RAMP = 400.0  # [s] of a slow ramp
 RIGID_LOAD = (
@@ -51,12 +50,6 @@ class RigError(ValueError):
     """A measurement did not settle."""
 
 
-def _positive(name: str, torque: float) -> float:
-    if not torque > 0.0:
-        raise InputError(f"{name}: {torque:g} N·m must be greater than 0")
-    return torque
-
-
 class TestRig:
     """Rig with one gearbox on it.
 
@@ -67,12 +60,20 @@ class TestRig:
     """
 
     __test__ = False  # no test case of pytest
+    unit = "N·m"  # of the load
+    frequency = 20.0  # [Hz] of the load on the stiffest segment of the curve, damped critically
+    without_torsion = "a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance"
 
     @checked
     def __init__(self, gearbox: Gearbox | Gear) -> None:
+        self._mount(gearbox)
+
+    def _mount(self, gearbox: Gearbox | Gear, drag: float = 0.0) -> None:
+        """Put a gearbox on the rig, with a dry friction on its input shaft [N·m]."""
         if isinstance(gearbox, Gear):
             gearbox = gearbox.gearbox()
         self.gearbox = gearbox = gearbox.forward()
+        self.drag = drag
         self.rigid = isinstance(gearbox.stiffness, Rigid)  # without a twist
         self.load = self._load()
 
@@ -82,7 +83,7 @@ class TestRig:
         if isinstance(stiffness, Rigid):
             return Load(inertia=RIGID_LOAD * (self.gearbox.inertia or 1.0) * self.gearbox.ratio**2)
         k = max(stiffness.all_slopes())
-        omega = 2.0 * np.pi * RIG_FREQUENCY
+        omega = 2.0 * np.pi * self.frequency
         return Load(inertia=k / omega**2, viscous_friction=2.0 * k / omega)
 
     def _twist_at(self, torque: float) -> float:
@@ -97,8 +98,16 @@ class TestRig:
     def _flywheel(self) -> Drive:
         # So large that its speed does not sink notably under the torque of a large gear of low ratio either.
         share = max(1.0, self.gearbox.rated_output_torque / self.gearbox.ratio / LARGE_TORQUE)
-        motor = Motor(kind="torque_source", rotor_inertia=share * FLYWHEEL)
-        return Drive(motor=motor, gearbox=self.gearbox, load=self.load)
+        return Drive(motor=self._input(share * FLYWHEEL), gearbox=self.gearbox, load=self.load)
+
+    def _input(self, inertia: float) -> Motor:
+        """The motor of the rig, with the drag of what is on it."""
+        return Motor(kind="torque_source", rotor_inertia=inertia, friction_torque=self.drag)
+
+    def _positive(self, name: str, torque: float) -> float:
+        if not torque > 0.0:
+            raise InputError(f"{name}: {torque:g} {self.unit} must be greater than 0")
+        return torque
 
     # --- (a), (e): steady state ---
 
@@ -178,7 +187,7 @@ class TestRig:
     def _torsion(self, turning_points: Iterable[float], samples: int = 2000) -> RunArrays:
         """The same without a dataset."""
         if self.rigid:
-            raise InputError("a rigid gearbox has no torsion to measure; give gearbox.stiffness a compliance")
+            raise InputError(self.without_torsion)
         points = [0.0, *turning_points]
         times = [RAMP * k for k in range(len(points))]
         # The locked input is a flywheel at rest; the load torque pulls against the output.
@@ -200,7 +209,9 @@ class TestRig:
         """K1, K2, ... [N·m/rad]: slopes between the given torques [N·m], and from the last up to `up_to`."""
         edges = [0.0, *torques, up_to]
         if any(low >= high for low, high in itertools.pairwise(edges)):
-            raise InputError(f"torques {shown([*torques, up_to])} N·m must rise, from above 0 up to the last one")
+            raise InputError(
+                f"torques {shown([*torques, up_to])} {self.unit} must rise, from above 0 up to the last one"
+            )
         twist, torque = self.initial_loading_curve(up_to)
         out = []
         for low, high in itertools.pairwise(edges):
@@ -214,12 +225,12 @@ class TestRig:
     @checked
     def backlash(self, torque: Torque) -> float:
         """Total gap [rad]: twice where the first loaded segment, taken up to `torque` [N·m], meets zero torque."""
-        return gap(*self.initial_loading_curve(_positive("torque", torque)), torque)
+        return gap(*self.initial_loading_curve(self._positive("torque", torque)), torque)
 
     @checked
     def loop(self, amplitude: Torque) -> Loop:
         """The loop that a slow load between -amplitude and amplitude [N·m] settles on."""
-        samples, amplitude = 2000, _positive("amplitude", amplitude)
+        samples, amplitude = 2000, self._positive("amplitude", amplitude)
         result = self._torsion([amplitude, -amplitude, amplitude, -amplitude, amplitude], samples)
         return Loop(amplitude, result["twist"][3 * samples :], result["output_torque"][3 * samples :])
 
@@ -237,7 +248,7 @@ class TestRig:
         """Input torque [N·m] that sets the gearbox in motion against a relative load, by a slow ramp."""
         g = self.gearbox
         against = load * g.rated_output_torque
-        begin, rise = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio
+        begin, rise = against / g.ratio, (1.0 + 4.0 * load) * g.rated_output_torque / g.ratio + 2.0 * self.drag
         result = self._run(
             self._braked(),
             command=CommandSignal(samples=Samples(times=(0.0, RAMP), values=(begin, begin + rise))),
@@ -266,7 +277,7 @@ class TestRig:
         """The gearbox driven by a torque; a damper on the input, without effect at rest, keeps it slow once loose."""
         g = self.gearbox
         damper = g.rated_output_torque / g.ratio / (1e-3 * g.rated_input_speed)
-        motor = Motor(kind="torque_source", rotor_inertia=g.inertia or self.load.inertia / g.ratio**2)
+        motor = self._input(g.inertia or self.load.inertia / g.ratio**2)
         return Drive(motor=motor, gearbox=g.model_copy(update={"viscous_friction": damper}), load=self.load)
 
     @staticmethod
