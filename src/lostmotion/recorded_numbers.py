@@ -41,12 +41,12 @@ class Tape:
         """The value of a parameter of this number."""
         return self._number(self._formula("parameter", number, number), value)
 
-    def apply(self, law: str, function: Callable[..., float], *of: float) -> float:
+    def apply(self, law: str, function: Callable[..., float], *operands: float) -> float:
         """The value of a function, recorded. What is not finite is none."""
-        value = function(*map(value_of, of))
+        value = function(*map(value_of, operands))
         if not math.isfinite(value):
             return value
-        one, *other = map(self.formula_of, of)
+        one, *other = map(self.formula_of, operands)
         return self._number(self._formula(law, one, *(other or (one,))), value)
 
     def compare(self, comparison: str, one: float, other: float, *, holds: bool) -> bool:
@@ -85,10 +85,14 @@ class Tape:
         raise ValueError("too many numbers are the same")
 
 
-def of_function(law: str, function: Callable[..., float], *of: float) -> float:
+def of_function(law: str, function: Callable[..., float], *operands: float) -> float:
     """A function of numbers; of recorded ones it is recorded where the core has it, as one of `FUNCTIONS`."""
-    tape = next((x.tape for x in of if isinstance(x, Recorded)), None)
-    return function(*map(float, of)) if tape is None or law not in FUNCTIONS else tape.apply(law, function, *of)
+    tape = next((x.tape for x in operands if isinstance(x, Recorded)), None)
+    return (
+        function(*map(float, operands))
+        if tape is None or law not in FUNCTIONS
+        else tape.apply(law, function, *operands)
+    )
 
 
 def may_differ(x: float) -> bool:

@@ -72,12 +72,12 @@ class Prepared:
         """Some of its samples as a log of their own, whose time begins at 0; all of them as they are."""
         if (begin, end) == (0, len(self.time)):
             return self
-        of = slice(begin, end)
+        samples = slice(begin, end)
         own = replace(
             self.log,
             name=self.name if begin == 0 else f"{self.name} from {self.time[begin]:.4g} s",
-            time=self.log.time[of],
-            channels={name: replace(c, values=c.values[of]) for name, c in self.log.channels.items()},
+            time=self.log.time[samples],
+            channels={name: replace(c, values=c.values[samples]) for name, c in self.log.channels.items()},
             notes=self.log.notes if begin == 0 else (),
         )
         segments = [
@@ -88,12 +88,12 @@ class Prepared:
         return replace(
             self,
             log=own,
-            time=self.time[of] - self.time[begin],
-            inputs={name: x[of] for name, x in self.inputs.items()},
-            measured={name: x[of] for name, x in self.measured.items()},
+            time=self.time[samples] - self.time[begin],
+            inputs={name: x[samples] for name, x in self.inputs.items()},
+            measured={name: x[samples] for name, x in self.measured.items()},
             facts=self.facts | first_values(own) if begin > 0 else self.facts,
             segments=tuple(segments),
-            weight=self.weight[of],
+            weight=self.weight[samples],
             cache={},
         )
 

@@ -90,7 +90,7 @@ def axis_figures(
     named: its variables begin with the name of its motor.
     sliding: whether the motor moves a slide, and whether the position is the position of a slide.
     """
-    prefix, of = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
+    prefix, suffix = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
     kind = controller.reference.kind
     if kind == "torque":
         return []
@@ -100,8 +100,8 @@ def axis_figures(
     followed = [{"variable": reference, "label": "reference"}, {"variable": measured, "label": "measured"}]
     error = [{"variable": reference, "minus": measured, "label": "reference − measured"}]
     return [
-        {"title": f"{quantity.capitalize()}{of}", "unit": unit, "series": followed},
-        {"title": f"Measured following error{of}", "unit": unit, "series": error},
+        {"title": f"{quantity.capitalize()}{suffix}", "unit": unit, "series": followed},
+        {"title": f"Measured following error{suffix}", "unit": unit, "series": error},
     ]
 
 

@@ -41,7 +41,7 @@ class ActuatedState:
 class ActuatedSnapshot(ActuatedState):
     """Copy of a state in memory, as `Actuated.snapshot` returns it. It cannot be pickled; an `ActuatedState` can."""
 
-    of: Actuated = field(repr=False)
+    robot: Actuated = field(repr=False)
 
 
 class Actuated:
@@ -379,7 +379,7 @@ class Actuated:
         InputError
             The snapshot is from another robot.
         """
-        if not isinstance(snapshot, ActuatedSnapshot) or snapshot.of is not self:
+        if not isinstance(snapshot, ActuatedSnapshot) or snapshot.robot is not self:
             raise InputError(f"snapshot: {shown(snapshot)} is none of this robot; between robots, use state")
         self._trains.restore(snapshot.drives)
         self._restore_robot(snapshot)

@@ -84,4 +84,7 @@ def constants() -> list[Constant]:
             f"{DOES_NOT} data, nor from the printed t_m0 and T_RC",
         ),
     ]
-    return [Constant(name, unit, printed, of(new), of(old), remark) for name, unit, printed, of, remark in rows]
+    return [
+        Constant(name, unit, printed, value_of(new), value_of(old), remark)
+        for name, unit, printed, value_of, remark in rows
+    ]

@@ -363,7 +363,7 @@ def _decibels(values: Any) -> Any:
 
 
 def _response_panels(
-    results: Results, label: str, of: Callable[[Any], Any], y_range: tuple[float, float], level: tuple[str, float]
+    results: Results, label: str, quantity: Callable[[Any], Any], y_range: tuple[float, float], level: tuple[str, float]
 ) -> Iterator[Panel]:
     """The models at each amplitude, with the cutoff that the paper prints."""
     rigid = paper_scenario("1-DOF-L", "large")
@@ -374,10 +374,10 @@ def _response_panels(
     across = Curve(level[0], ends, np.full(2, level[1]), LEVEL)
     printed = Curve("2.6 Hz, printed", np.full(2, 2.6), np.array(y_range), FAINT)
     for amplitude, value in AMPLITUDES.items():
-        curves = [Curve("1-DOF-L, closed form", FREQUENCIES, of(closed * normal), CLOSED_FORM)]
+        curves = [Curve("1-DOF-L, closed form", FREQUENCIES, quantity(closed * normal), CLOSED_FORM)]
         for model in MODELS:
             response = results.load_response(model, amplitude) * normal
-            curves.append(Curve(model, FREQUENCIES, of(response), STYLES[model]))
+            curves.append(Curve(model, FREQUENCIES, quantity(response), STYLES[model]))
         yield Panel(
             _titled("", value), "frequency [Hz]", label, (*curves, across, printed), y_range=y_range, log_x=True
         )

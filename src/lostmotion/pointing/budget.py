@@ -192,14 +192,14 @@ def pointing_budget(
     if progress is not None:
         for _ in range(len(cases) - len(known) + 1):
             progress()
-    of = {case: known[one] for case, one in changed.items()}
-    (time, errors, measured), whole = as_it_is, of["whole", ""]
+    known_errors = {case: known[one] for case, one in changed.items()}
+    (time, errors, measured), whole = as_it_is, known_errors["whole", ""]
 
     def group(kind: str) -> dict[Any, Errors]:
-        return {name: value for (own, name), value in of.items() if own == kind}
+        return {name: value for (own, name), value in known_errors.items() if own == kind}
 
     causes = list(group("without"))
-    ideal = of["successive", causes[-1]] if causes else whole
+    ideal = known_errors["successive", causes[-1]] if causes else whole
     speeds = group("speed")
     return PointingBudget(
         scenario,

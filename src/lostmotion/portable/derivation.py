@@ -61,7 +61,9 @@ class Derivation:
             "conditions": ("comparison", "one", "other", "holds"),
             "results": ("place", "formula"),
         }
-        return {name: [dict(zip(of, row, strict=True)) for row in getattr(self, name)] for name, of in keys.items()}
+        return {
+            name: [dict(zip(names, row, strict=True)) for row in getattr(self, name)] for name, names in keys.items()
+        }
 
 
 def derivation_of(scenario: Scenario, numbers: Numbers, without: Callable[[str], bool] | None = None) -> Derivation:
@@ -181,8 +183,8 @@ class _Recording:
         """Formulas, and those that they take."""
         used, waiting = set(formulas), list(formulas)
         while waiting:
-            law, *of, _ = self._tape.formulas[waiting.pop()]
-            new = set() if law in ("parameter", "constant") else set(of) - used
+            law, *operands, _ = self._tape.formulas[waiting.pop()]
+            new = set() if law in ("parameter", "constant") else set(operands) - used
             used |= new
             waiting += new
         return used

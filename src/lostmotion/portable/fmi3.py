@@ -104,8 +104,8 @@ def _add_variables(variables: ET.Element, model: Model) -> None:
         kind = {"causality": "local", "initial": "approx", "start": repr(start)}
         add(f"state.{v.name}", FIRST_STATE + k, f"continuous state: {v.meaning}", v.unit, **kind, **v.nominal)
     for k, v in enumerate(model.states):
-        meaning, of = f"time derivative of state.{v.name}", {"derivative": str(FIRST_STATE + k)}
-        add(f"der(state.{v.name})", FIRST_DERIVATIVE + k, meaning, rate_unit(v.unit), **local, **of)
+        meaning, attributes = f"time derivative of state.{v.name}", {"derivative": str(FIRST_STATE + k)}
+        add(f"der(state.{v.name})", FIRST_DERIVATIVE + k, meaning, rate_unit(v.unit), **local, **attributes)
     for k in range(model.indicators if model.states else 0):
         meaning = "positive while the contacts stay as they are"
         add(f"event_indicator.{k}", FIRST_INDICATOR + k, meaning, "1", **local)
@@ -128,7 +128,8 @@ def terminals(train: DriveTrain, model: Model) -> bytes:
     for load, shaft in loads.items():
         slide = train.is_slide(shaft)
         moved = {
-            m: train.variable(shaft, of) for m, of in (("speed", "speed"), ("position" if slide else "angle", "angle"))
+            m: train.variable(shaft, quantity)
+            for m, quantity in (("speed", "speed"), ("position" if slide else "angle", "angle"))
         }
         members = {train.torque_word(shaft): load} | {m: v for m, v in moved.items() if v in outputs}
         _add_terminal(listed, f"{shaft}_{'slide' if slide else 'shaft'}", members)

@@ -53,29 +53,29 @@ class LoopErrors:
 
     def lines(self) -> Iterator[str]:
         """Lines of a summary."""
-        of = f"{self.name.replace('_', ' ')} {self.quantity}".strip()
-        yield f"{of} error, true (reference less {self.shaft}): {_ends(self.true, self.unit)}"
+        subject = f"{self.name.replace('_', ' ')} {self.quantity}".strip()
+        yield f"{subject} error, true (reference less {self.shaft}): {_ends(self.true, self.unit)}"
         if self.measured is not None:
             ends = _ends(self.measured, self.unit)
-            yield f"{of} error, measured (reference less encoder on {self.encoder}): {ends}"
+            yield f"{subject} error, measured (reference less encoder on {self.encoder}): {ends}"
         if self.overshoot > SEEN * self.range:
             beyond = _shown(self.overshoot, self.unit, 4)
-            yield f"{of} leaves the range of its reference by {beyond}"
+            yield f"{subject} leaves the range of its reference by {beyond}"
 
     def points(self) -> Iterator[Point]:
         """Answer to whether the loop is stable, if it is not, or if it swings. A swing that lasts by itself misses no requirement.
 
         The motor of an unstable axis may swing within its backlash, while friction holds what the error is of.
         """
-        of = f"the {self.quantity} error{f' of {self.name}' if self.name else ''}"
+        subject = f"the {self.quantity} error{f' of {self.name}' if self.name else ''}"
         if self.grows and self.swing == 0.0:
-            yield Point("does not fit", f"unstable: {of} diverges, up to {_shown(_peak(self.true), self.unit, 3)}")
+            yield Point("does not fit", f"unstable: {subject} diverges, up to {_shown(_peak(self.true), self.unit, 3)}")
         elif self.swing > 0.0:
             swing = f"±{_shown(self.swing, self.unit, 3)} at {self.frequency:.3g} Hz"
             unstable, how = self.grows or bool(self.pole), "grows" if self.grows else "does not die out"
             yield Point(
                 "does not fit" if unstable else "fits with a reservation",
-                f"{'unstable: ' if unstable else ''}{of} swings by {swing} at the end, which {how}"
+                f"{'unstable: ' if unstable else ''}{subject} swings by {swing} at the end, which {how}"
                 f"{f'; {self.pole}' if self.pole else ''}",
             )
         elif self.pole:

@@ -310,16 +310,16 @@ def train_model(
 ) -> LinearModel:
     """The linear model of a train, from what the solver says of one of its regimes."""
     n, m = len(states), len(inputs)
-    of = dict(zip(outputs, values, strict=True))
+    rows = dict(zip(outputs, values, strict=True))
     nothing = np.zeros(n + m + 1)
     variables = variables_of_core(core.variables())
     if all(gear.transmission_error is None for gear in train.gears.values()):  # else the angles are not linear
-        known = np.array([of.get(name, nothing) for name, *_ in core.channels()])
+        known = np.array([rows.get(name, nothing) for name, *_ in core.channels()])
         angles = {train.variable(name, "angle") for name in train.shafts}
         following = zip((v.name for v in variables if v.derived), core.derive(known), strict=True)
-        of |= {name: row for name, row in following if name in angles}
-    whole = np.array(list(of.values()))
-    units = {v.name: v.unit for v in variables if v.name in {*states, *inputs, *of}}
+        rows |= {name: row for name, row in following if name in angles}
+    whole = np.array(list(rows.values()))
+    units = {v.name: v.unit for v in variables if v.name in {*states, *inputs, *rows}}
     return LinearModel(
         A=rates[:, :n],
         B=rates[:, n : n + m],
@@ -332,7 +332,7 @@ def train_model(
         units=units,
         states=tuple(states),
         inputs=tuple(inputs),
-        outputs=tuple(of),
+        outputs=tuple(rows),
     )
 
 

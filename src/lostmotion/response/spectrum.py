@@ -421,7 +421,7 @@ def _steps(long: Scenario, motor: str) -> Iterator[tuple[str, float, bool]]:
 def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str, float, bool]]:
     """Name, order per turn of the motor, and presence of multiples, for each part that states a period."""
 
-    def of(shaft: str, order: float) -> float:
+    def source_of(shaft: str, order: float) -> float:
         ratio = turns(train, over, shaft)
         return 0.0 if ratio is None else order / abs(ratio)
 
@@ -430,16 +430,16 @@ def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str
             order, curve = _order(gear.transmission_error)
             slide = train.is_slide(gear.output)
             kind = ("screw turn" if slide else "worm turn") if order == 1.0 else "tooth mesh"
-            yield f"{kind}: transmission error of {name}", of(gear.input, order), curve
+            yield f"{kind}: transmission error of {name}", source_of(gear.input, order), curve
         if gear.mesh_stiffness is not None:
-            yield f"tooth mesh: mesh stiffness of {name}", of(gear.input, gear.mesh_stiffness.teeth), True
+            yield f"tooth mesh: mesh stiffness of {name}", source_of(gear.input, gear.mesh_stiffness.teeth), True
     driven = {motor.shaft for motor in train.motors.values()}
     for name, torque in train.angle_torques.items():
         order, curve = _order(torque)
         kind = "cogging" if torque.shaft in driven else "torque over the angle"
-        yield f"{kind}: {name} on {torque.shaft}", of(torque.shaft, order), curve
+        yield f"{kind}: {name} on {torque.shaft}", source_of(torque.shaft, order), curve
     for name, mass in train.gravity.items():
-        yield f"gravity: {name} on {mass.shaft}", of(mass.shaft, 1.0), False
+        yield f"gravity: {name} on {mass.shaft}", source_of(mass.shaft, 1.0), False
     for name, controller in long.axes().items():
         for key in ("encoder", "position_encoder"):
             encoder = getattr(controller, key, None)
@@ -449,7 +449,7 @@ def _sources(long: Scenario, train: DriveTrain, over: str) -> Iterator[tuple[str
             per_turn = encoder.error_periods or encoder.lines
             if per_turn is None:  # of a linear scale, whose coordinate is a length
                 per_turn = 2.0 * math.pi / encoder.grating_period
-            yield f"encoder error: {key} of {name} on {shaft}", of(shaft, per_turn), False
+            yield f"encoder error: {key} of {name} on {shaft}", source_of(shaft, per_turn), False
 
 
 def _order(law: Any) -> tuple[float, bool]:

@@ -228,16 +228,18 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
         state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: 0.5 * (edges[0] + edges[1])})
         yield "gap", f"{main} within its gap, {moving}", state, {}
     for forward in (True,) if curve.odd else (True, False):
-        ends, of = curve.side(forward)
+        ends, slopes = curve.side(forward)
         ends = [0.0, *ends, edges[-1]]
         pieces = (
-            {"first stiffness": first, "last stiffness": len(of) - 1} if len(of) > first + 1 else {"stiffness": first}
+            {"first stiffness": first, "last stiffness": len(slopes) - 1}
+            if len(slopes) > first + 1
+            else {"stiffness": first}
         )
         for name, k in pieces.items():
             twist = 0.5 * (ends[k] + ends[k + 1])
             state = TrainInitial(speeds=_speeds(axis, v, SLIP), twists=twists | {main: twist if forward else -twist})
             where = "" if forward else " backward"
-            yield f"{name}{where}", f"{main} with {_stiffness(train, main, of[k])}{where}, {moving}", state, {}
+            yield f"{name}{where}", f"{main} with {_stiffness(train, main, slopes[k])}{where}, {moving}", state, {}
     within = 0.5 * (edges[first] + edges[first + 1])
     at = twists | {main: within}
     hysteresis = train.gears[main].hysteresis

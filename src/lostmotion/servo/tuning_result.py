@@ -171,12 +171,12 @@ def conventions(
                 ("", f"{amps:.5g} A peak/{speed}", f"amplitude of a phase, with {torque_constant:.4g} {force}/A peak")
             )
             amps, torque_constant, unit = amps / math.sqrt(2.0), torque_constant * math.sqrt(2.0), "A rms"
-        of = {
+        named = {
             "peak": "current of a phase",
             "dc": "current of the armature",
             "of the data sheet": "amperes as in limits.torque_constant",
         }
-        rows.append(("", f"{amps:.5g} {unit}/{speed}", f"{of[amperes]}, with {torque_constant:.4g} {force}/{unit}"))
+        rows.append(("", f"{amps:.5g} {unit}/{speed}", f"{named[amperes]}, with {torque_constant:.4g} {force}/{unit}"))
         if not linear_motor:
             rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} m{unit}/rpm", "the same per revolution in a minute"))
     if integral_gain:

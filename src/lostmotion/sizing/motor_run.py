@@ -80,8 +80,8 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
 
 def phase_amplitudes(scenario: Scenario, result: xarray.Dataset | RunArrays, motor: str) -> list[np.ndarray] | None:
     """Currents i_d, i_q [A] and voltages u_d, u_q [V] under field-oriented control; None without."""
-    of = ("direct_current", "quadrature_current", "direct_voltage", "quadrature_voltage")
-    names = [scenario.train().variable(motor, quantity) for quantity in of]
+    quantities = ("direct_current", "quadrature_current", "direct_voltage", "quadrature_voltage")
+    names = [scenario.train().variable(motor, quantity) for quantity in quantities]
     if any(name not in result for name in names):
         return None
     return [np.asarray(result[name]) for name in names]

@@ -133,11 +133,11 @@ def over_pieces(at: Callable[[np.ndarray], np.ndarray], time: np.ndarray, edges:
         middle = begin + 0.5 * length
         pieces = np.stack([begin, middle, middle, begin + length], axis=1)[~good].reshape(-1, 2)
     begin, length, mean, variance = (np.concatenate(columns) for columns in zip(*done, strict=True))
-    of = np.clip(np.searchsorted(time, begin, side="right") - 1, 0, len(time) - 2)
+    step_of_piece = np.clip(np.searchsorted(time, begin, side="right") - 1, 0, len(time) - 2)
     steps = np.diff(time)
 
     def averaged(values: np.ndarray) -> np.ndarray:
-        return np.bincount(of, values * length, len(steps)) / steps
+        return np.bincount(step_of_piece, values * length, len(steps)) / steps
 
     whole = averaged(mean)
-    return Squares(steps, whole, averaged(variance + (mean - whole[of]) ** 2), error)
+    return Squares(steps, whole, averaged(variance + (mean - whole[step_of_piece]) ** 2), error)

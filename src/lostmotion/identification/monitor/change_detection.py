@@ -272,11 +272,11 @@ def _log_factors(
         dd, dx = np.cumsum(d * d, axis=0), np.cumsum(d * rows.x[:, None], axis=0)
         dc = np.cumsum(d[:, :, None] * rows.columns[:, None, :], axis=0)
         for k in range(baseline, n):
-            of = slice(0, k - baseline + 1)
+            begins = slice(0, k - baseline + 1)
             inverse = np.linalg.pinv(inner[k], hermitian=True)
-            part = dc[k, of] @ inverse
-            q = np.maximum(dd[k, of] - np.sum(part * dc[k, of], axis=1), 0.0)
-            b = dx[k, of] - part @ along[k]
+            part = dc[k, begins] @ inverse
+            q = np.maximum(dd[k, begins] - np.sum(part * dc[k, begins], axis=1), 0.0)
+            b = dx[k, begins] - part @ along[k]
             R = max(float(squares[k] - along[k] @ inverse @ along[k]), 1e-300)
             freedom = k + 1 - p
             for size, s in enumerate(SIZES):
@@ -287,5 +287,5 @@ def _log_factors(
                     t = b * np.sqrt(shrunk) / np.sqrt(R * left / freedom) * (1.0 if direction == "up" else -1.0)
                     tail = np.log(np.maximum(stdtr(freedom, t), 1e-300))
                     found = found + math.log(2.0) + np.where(t > -30.0, tail, log_ndtr(t))
-                out[k, of, shape, size] = found
+                out[k, begins, shape, size] = found
     return out, rows

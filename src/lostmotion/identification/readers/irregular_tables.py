@@ -84,13 +84,13 @@ def _heading(head: Sequence[TableRow], width: int, number: Number, comments: lis
             pairs[texts[0]] = texts[1::2]
         elif len(texts) < width and len(texts) > 1 and all(texts[:2]):
             comments.append(f"{texts[0]}: {texts[1]}")
-    of = {re.sub(r"[\W_]", "", re.sub(r"[\[(].*", "", key)).lower(): key for key in pairs}
-    names = pairs.get(of.get("name", ""), pairs.get(of.get("symbolname", ""), []))
+    written = {re.sub(r"[\W_]", "", re.sub(r"[\[(].*", "", key)).lower(): key for key in pairs}
+    names = pairs.get(written.get("name", ""), pairs.get(written.get("symbolname", ""), []))
     if names and all(names):
         clock = next(
             (m[1] for key in pairs if "time" in key.lower() and (m := re.search(r"[\[(](\w+)[\])]", key))), "s"
         )
-        units = pairs.get(of.get("unit", ""), [""] * len(names))
+        units = pairs.get(written.get("unit", ""), [""] * len(names))
         found = []
         for k, (name, unit) in enumerate(zip(_distinct(names), units, strict=True)):
             found += [f"{TIME_OF}{name} [{clock}]" if k else f"time [{clock}]", f"{name} [{unit}]" if unit else name]

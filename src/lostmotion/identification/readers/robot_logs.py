@@ -97,9 +97,9 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
     clock = _stamps(path, topic, topics[topic]) if stamped else instants
     long: set[str] = set()
     channels = {
-        name: Channel(_at(instants, course, own=of == topic))
-        for of, rows in topics.items()
-        for name, course in _courses(path, of, rows, long).items()
+        name: Channel(_at(instants, course, own=topic_name == topic))
+        for topic_name, rows in topics.items()
+        for name, course in _courses(path, topic_name, rows, long).items()
     }
     if not channels:
         raise InputError(f"the messages of {listed(topics)} have no number", where=path)
@@ -245,10 +245,10 @@ def _check_lists(types: Mapping[str, Any]) -> None:
         for member, (node, inner) in members:
             if node not in (Nodetype.ARRAY, Nodetype.SEQUENCE):
                 continue
-            (of, what), length = inner
-            if is_empty(of, what):
+            (kind_of_entry, what), length = inner
+            if is_empty(kind_of_entry, what):
                 raise ValueError(f"{kind}.{member} is a list of messages without data")
-            if node == Nodetype.ARRAY and (of == Nodetype.NAME or what[0] in ("string", "wstring")):
+            if node == Nodetype.ARRAY and (kind_of_entry == Nodetype.NAME or what[0] in ("string", "wstring")):
                 entries += length
     if entries > MOST_ENTRIES:
         raise ValueError(f"its fixed lists of words or messages have more than {MOST_ENTRIES} entries")

@@ -51,9 +51,9 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: ShownMot
     at, x = measured_course(rig, log, shown.channel, known)
     h, found = log.log.interval, []
     for segment in log.segments:
-        of = slice(segment.begin, segment.end)
-        there = np.isfinite(x[of])
-        own, values = at[of][there], x[of][there]
+        samples = slice(segment.begin, segment.end)
+        there = np.isfinite(x[samples])
+        own, values = at[samples][there], x[samples][there]
         for piece in np.split(np.arange(len(own)), np.flatnonzero(np.diff(own) > PAUSE * h) + 1):
             if len(piece) < 3 * width:
                 continue

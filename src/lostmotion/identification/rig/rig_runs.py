@@ -257,7 +257,7 @@ class _Course:
                 own = row.values[place[name]][at]
                 values = values + factor * own
                 by = by + factor * derivatives[:, place[name]][:, at]
-                by += np.outer([of[name] for of in self._terms_by[k]], own)
+                by += np.outer([terms[name] for terms in self._terms_by[k]], own)
             self._rows[k].append(values)
             self._rows_by[k].append(by)
         if len(self._log.segments) > 1:

@@ -48,7 +48,7 @@ class SharedFault:
 
     logs: tuple[str, ...]
     """names"""
-    of: int
+    total: int
     """number of all logs"""
     fault: str
     """the fault, with the range of its size"""
@@ -68,7 +68,7 @@ class SharedFault:
         )
         candidate = f"; candidate: {self.candidate}" if self.candidate else ""
         rest = "a fault that logs share is the model's, so that they stay in the fit"
-        return f"{len(self.logs)} of {self.of} logs ({names}): {self.fault}; {common}; {rest}{candidate}"
+        return f"{len(self.logs)} of {self.total} logs ({names}): {self.fault}; {common}; {rest}{candidate}"
 
 
 @dataclass(frozen=True)

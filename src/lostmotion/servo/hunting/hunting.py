@@ -249,7 +249,7 @@ def hunting_map(
     if math.prod(shape) > MAX_POINTS:
         raise InputError(f"grid: {math.prod(shape)} points are more than {MAX_POINTS}; give fewer values")
     plain = train.train()
-    of = (
+    variable = (
         plain.variable(list(plain.shafts)[-1], "angle")
         if variable is None
         else known_output(variable, UndrivenLoop.of(train).channels)
@@ -259,7 +259,7 @@ def hunting_map(
     def point(index: tuple[int, ...]) -> tuple[float, float, bool, str, str]:
         nonlocal done
         changes = {key: values[k].item() for (key, values), k in zip(keys.items(), index, strict=True)}
-        result = _point(scenario.replace(**changes).long(), of)
+        result = _point(scenario.replace(**changes).long(), variable)
         done += 1
         if progress is not None:
             progress(done)
@@ -270,9 +270,9 @@ def hunting_map(
     columns = [np.array(column).reshape(shape) for column in zip(*rows, strict=True)]
     names = tuple(key.replace(".", "_") for key in keys)
     last = list(plain.shafts)[-1]
-    unit = {"units": plain.angle_unit(last)} if of == plain.variable(last, "angle") else {}
+    unit = {"units": plain.angle_unit(last)} if variable == plain.variable(last, "angle") else {}
     about = [
-        ("amplitude", {"long_name": f"amplitude of {of}", **unit}),
+        ("amplitude", {"long_name": f"amplitude of {variable}", **unit}),
         ("frequency", {"long_name": "frequency of the limit cycle", "units": "Hz"}),
         ("stable", {"long_name": "whether neighbouring motions approach it"}),
         ("verdict", {"long_name": "hunts, at rest, or not decided"}),
@@ -280,7 +280,7 @@ def hunting_map(
     ]
     data = {name: (names, column, attrs) for (name, attrs), column in zip(about, columns, strict=True)}
     coords = {n: (n, values, _named(train, key)) for n, (key, values) in zip(names, keys.items(), strict=True)}
-    return xr.Dataset(data, coords=coords, attrs={"variable": of})
+    return xr.Dataset(data, coords=coords, attrs={"variable": variable})
 
 
 def _named(train: Scenario, key: str) -> dict[str, str]:

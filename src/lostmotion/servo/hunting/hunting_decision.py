@@ -117,12 +117,14 @@ class WatchedRun:
         settled = [points[-1][0] for points in points.values()]
         settled += [c.reference.duration for c in scenario.axes().values()]
         self.settled = max(settled, default=0.0)
-        instants = sorted({p[0] for of in points.values() for p in of} | {0.0})
+        instants = sorted({p[0] for course in points.values() for p in course} | {0.0})
         for begin, end in itertools.pairwise([*instants, self._instant(self.settled)]):
-            values = {name: (_value(of, begin, begin), _value(of, begin, end)) for name, of in points.items()}
+            values = {
+                name: (_value(course, begin, begin), _value(course, begin, end)) for name, course in points.items()
+            }
             if end > self.simulation.time:
                 self.simulation.advance(end - self.simulation.time, **values)
-        self.inputs = {name: of[-1][1] for name, of in points.items()}
+        self.inputs = {name: course[-1][1] for name, course in points.items()}
 
     def _instant(self, time: float) -> float:
         """The first after a time that is halfway between two ticks and a whole number of frames after the first."""

@@ -196,8 +196,8 @@ class _Builder:
         self.A = self.basis.T @ A @ self.basis
         self.stuck = self.basis.T @ (still.A / self.scale[:, None] * self.scale) @ self.basis
 
-    def row(self, name: str, *, of: LinearModel | None = None) -> np.ndarray:
-        model = self.forward if of is None else of
+    def row(self, name: str, *, model: LinearModel | None = None) -> np.ndarray:
+        model = self.forward if model is None else model
         if name in model.states:
             row = np.eye(len(model.states))[model.states.index(name)]
         else:
@@ -213,7 +213,7 @@ class _Builder:
             raise UndecidableError(f"the modes of the slip are too near to each other (condition {condition:.1e})")
         inverse = np.linalg.inv(modes)
         held, error = (
-            self.row(self.train.variable(self.shaft, "contact_torque"), of=self.still),
+            self.row(self.train.variable(self.shaft, "contact_torque"), model=self.still),
             self.row(self.train.variable(self.motor, "error")),
         )
         p, q, ramp, S, stuck_rates = self.settled(held, error)

@@ -258,11 +258,15 @@ class SimulationBatch:
         if self._given:
             raise InputError(f"answer: the motion of {self._given} is given; use a load torque in its place")
         shafts = list(self._train.shafts)
-        if (of := shafts[-1] if shaft is None else shaft) not in shafts:
-            raise InputError(f"shaft: {shown(of)} is none; {did_you_mean(of, shafts, f'those are {listed(shafts)}')}")
-        load = self._train.variable(of, "load_torque")
-        if load not in self.inputs or (isinstance(self._core, WalkedBatch) and of != shafts[-1]):
-            raise InputError(f"shaft: {shown(of)} has no load torque among {listed(self.inputs)}; give one that has")
+        if (answering := shafts[-1] if shaft is None else shaft) not in shafts:
+            raise InputError(
+                f"shaft: {shown(answering)} is none; {did_you_mean(answering, shafts, f'those are {listed(shafts)}')}"
+            )
+        load = self._train.variable(answering, "load_torque")
+        if load not in self.inputs or (isinstance(self._core, WalkedBatch) and answering != shafts[-1]):
+            raise InputError(
+                f"shaft: {shown(answering)} has no load torque among {listed(self.inputs)}; give one that has"
+            )
         if command is not None:
             inputs[self._the_only("command")] = command
         if np.any(load_torque):
@@ -271,9 +275,11 @@ class SimulationBatch:
         self._take_parameters()
         if isinstance(self._core, ExactBatch):
             try:
-                rows = self._core.answer(values, load, shafts.index(of), self._threads)
+                rows = self._core.answer(values, load, shafts.index(answering), self._threads)
             except ValueError:
-                raise InputError(f"shaft: a mass matrix joins {shown(of)} to others; give one that is free") from None
+                raise InputError(
+                    f"shaft: a mass matrix joins {shown(answering)} to others; give one that is free"
+                ) from None
         else:
             rows = self._core.answer(values, self._threads)
         self._time += self._step

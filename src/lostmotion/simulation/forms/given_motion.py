@@ -43,13 +43,13 @@ def check_continuous(reference: PositionReference | SlideReference, unit: str) -
     Raises ValueError
     """
     pieces = reference.pieces()
-    for order, what, of in ((0, "position", unit), (1, "speed", f"{unit}/s")):
+    for order, what, unit_there in ((0, "position", unit), (1, "speed", f"{unit}/s")):
         size = max(abs(piece[1 + order]) for piece in pieces)
         for (begin, *given), (end, *after) in itertools.pairwise(pieces):
             before = taylor(given, end - begin)[order]
             if not math.isclose(before, after[order], rel_tol=1e-9, abs_tol=1e-9 * max(size, 1e-300)):
                 raise ValueError(
-                    f"its {what} jumps at {end:g} s from {before:.6g} to {after[order]:.6g} {of}, which takes an infinite "
+                    f"its {what} jumps at {end:g} s from {before:.6g} to {after[order]:.6g} {unit_there}, which takes an infinite "
                     "acceleration; give moves"
                 )
 

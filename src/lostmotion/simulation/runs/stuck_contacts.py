@@ -68,9 +68,9 @@ class ContactState:
             if self.mode == 0:
                 what = "pressed with" if END_STOP in self.name else "the flanks touch and press with"
                 return f"{self.name}: {what} {abs(self.torque):.4g} {unit}"
-            of, per_second = ("m", "m/s") if self.slides else ("rad", "rad/s")
+            length_unit, per_second = ("m", "m/s") if self.slides else ("rad", "rad/s")
             return (
-                f"{self.name}: in the gap, at {_shown(self.twist, of)} of -{_shown(self.reach, of)} to {_shown(self.reach, of)}, "
+                f"{self.name}: in the gap, at {_shown(self.twist, length_unit)} of -{_shown(self.reach, length_unit)} to {_shown(self.reach, length_unit)}, "
                 f"changing by {_shown(self.speed, per_second)}"
             )
         if self.mode != 0:
@@ -80,10 +80,10 @@ class ContactState:
         if math.isinf(self.capacity_forward):
             return f"{self.name}: rigid, holds {self.torque:.4g} {unit}"
         parts = [f"{name} +{forward:.4g} / -{backward:.4g}" for name, (forward, backward) in self.shares.items()]
-        of = f" ({', '.join(parts)})" if len(parts) > 1 else ""
+        composition = f" ({', '.join(parts)})" if len(parts) > 1 else ""
         return (
             f"{self.name}: stuck, holds {self.torque:.4g} {unit} of +{self.capacity_forward:.4g} / "
-            f"-{self.capacity_backward:.4g} {unit}{of}; {self.to_free_forward:.4g} {unit} more frees it forward, "
+            f"-{self.capacity_backward:.4g} {unit}{composition}; {self.to_free_forward:.4g} {unit} more frees it forward, "
             f"{self.to_free_backward:.4g} {unit} in reverse"
         )
 

@@ -33,7 +33,7 @@ def oriented(scenario: Scenario) -> Iterator[tuple[str, str, PhaseValues]]:
 def set_torques(scenario: Scenario, data: dict[str, np.ndarray]) -> None:
     """Puts the torque that belongs to the currents in place of the straight lines that the mechanics were driven by."""
     for name, _, phase in oriented(scenario):
-        torque, *currents = (scenario.train().variable(name, of) for of in ("torque", *CURRENTS))
+        torque, *currents = (scenario.train().variable(name, quantity) for quantity in ("torque", *CURRENTS))
         data[torque] = phase.torque(*(data[current] for current in currents))
 
 
@@ -62,7 +62,7 @@ def bounded(scenario: Scenario) -> dict[str, str]:
     names: dict[str, str] = {}
     train = scenario.train()
     for name, shaft, _ in oriented(scenario):
-        torque, along, across = (train.variable(name, of) for of in ("torque", *CURRENTS))
+        torque, along, across = (train.variable(name, quantity) for quantity in ("torque", *CURRENTS))
         names |= {along: across, across: across, torque: torque, train.variable(shaft, "speed"): torque}
     return names
 

@@ -62,7 +62,7 @@ class SimulationReadings:
             }
         train = scenario.train()
         for motor, _, phase in oriented(scenario):
-            torque, *currents = (train.variable(motor, of) for of in ("torque", *CURRENTS))
+            torque, *currents = (train.variable(motor, quantity) for quantity in ("torque", *CURRENTS))
             self._derived[torque] = self._torque_of(currents, phase)
             self._channel = {n: c for n, c in self._channel.items() if n != torque}
         self._variables += axis_variables(scenario.by_prefix(), scenario.sliding())

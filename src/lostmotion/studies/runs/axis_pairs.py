@@ -171,9 +171,9 @@ class Axes:
         assert not isinstance(motor, InputError)
         demand, findings = gearbox
         findings, lacking = self._chosen(row, [*findings, *self._braked(row, demand)])
-        if motor.copper_loss() is None and (of := self._electrical()) is not None:
+        if motor.copper_loss() is None and (needing := self._electrical()) is not None:
             lacking.append(
-                f"the sheet of the motor lacks its winding, which select for {of} needs; take mechanical_energy"
+                f"the sheet of the motor lacks its winding, which select for {needing} needs; take mechanical_energy"
             )
         if lacking:
             return InputError(problems=[Problem((), text) for text in lacking])

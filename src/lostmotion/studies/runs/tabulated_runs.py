@@ -53,8 +53,10 @@ def units_of(study: Study) -> dict[str, str]:
     """Units of the columns; empty where an expression's cannot be determined."""
     units = {v.title: v.unit for v in study.vary if v.names is None} | study.kept_units
     units |= {f"{USE}{rule}": "1" for rule in TASK_SHARES}
-    of = dict(study.vocabulary.variables)
-    return units | {f"{n} over time": of[n] for n in (study.trajectories.variables if study.trajectories else ())}
+    units_by_name = dict(study.vocabulary.variables)
+    return units | {
+        f"{n} over time": units_by_name[n] for n in (study.trajectories.variables if study.trajectories else ())
+    }
 
 
 @lru_cache(maxsize=4)
@@ -88,7 +90,7 @@ def _names(study: Study, runs: Runs, threads: int) -> dict[str, Any]:
 def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     """Load speed [rad/s] at command 1 of a rigid drive without inertia, friction and load, for each run."""
 
-    def of(scenario: Scenario) -> float:
+    def value_of(scenario: Scenario) -> float:
         train = scenario.train()
         (motor,) = train.motors.values()
         ratio = turns(train, motor.shaft, list(train.shafts)[-1])
@@ -97,9 +99,9 @@ def _ideal_speeds(study: Study, runs: Runs) -> np.ndarray:
     base = study.scenario
     keys = {key for v in study.vary for key in v.all_keys}
     if not any(key.startswith("motor") or key.endswith(".ratio") or kind_of_record(key) for key in keys):
-        return np.full(len(runs.errors), of(base))
+        return np.full(len(runs.errors), value_of(base))
     rows = zip(runs.parameters, runs.errors, strict=True)
-    return np.array([math.nan if error else of(study.scenario_at(row)) for row, error in rows])
+    return np.array([math.nan if error else value_of(study.scenario_at(row)) for row, error in rows])
 
 
 def _bandwidths(study: Study, runs: Runs, amplitude: Any, threads: int) -> np.ndarray:
