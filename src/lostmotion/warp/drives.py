@@ -15,6 +15,7 @@ from ..inputs.quantities import Count, Time
 from ..inputs.validation import listed, shown
 from ..model.drive import Drive
 from ..model.train import DriveTrain
+from ..simulation.batches.batch_parameters import mask_of_drives, numbers_of_drives, varied_columns
 from ..simulation.forms.dotted_keys import renamed
 from ..simulation.scenario.one_gear import drive_keys
 from ..simulation.scenario.scenario import Scenario
@@ -104,9 +105,9 @@ class Drives:
         self._keys = {key: k for k, key in enumerate(kernel.SHEET.values()) if key and _has(laws, key)}
         self._numbers = drive_keys(scenario)
         generator = np.random.default_rng(seed)
-        for key, value in (vary or {}).items():
-            column = value(generator, count) if callable(value) else value
-            sheets[self._place(key)] = np.broadcast_to(np.asarray(column, dtype=float), (count,))
+        places = {key: self._place(key) for key in vary or {}}
+        for key, column in varied_columns(scenario, vary or {}, count, generator).items():
+            sheets[places[key]] = column
         self._arrays.sheets = self._on_device(sheets.reshape(-1).astype(dtype))
         for name, rows in (("states", len(kernel.STATES)), ("shown", 6)):
             setattr(self._arrays, name, self._new(rows))
@@ -197,9 +198,7 @@ class Drives:
         which
             Array of Booleans with the drives that are meant; default all.
         """
-        keep = np.zeros(self._count, dtype=bool) if which is None else ~np.asarray(which, dtype=bool)
-        if keep.shape != (self._count,):
-            raise InputError(f"which: must be an array of {self._count} Booleans, one for each drive")
+        keep = np.zeros(self._count, dtype=bool) if which is None else ~mask_of_drives(which, self._count)
         a = self._arrays
         for each in (a.states, a.shown, a.modes, a.angles, a.doubts):
             rows = each.numpy().reshape(-1, self._count)
@@ -217,16 +216,17 @@ class Drives:
             raise InputError(f"{key}: is no parameter of these drives; the parameters are {listed(tuple(self._keys))}")
         return self._keys[number]
 
-    def _input(self, what: str, value: Any, kept: Any) -> Any:
+    def _input(self, what: str, value: Any, kept: Any, each: str = "drive") -> Any:
         """What a kernel reads: an array of Warp as it is, or else an array of the same shape, with the numbers that are given."""
         if isinstance(value, self._wp.array):
             if value.shape != kept.shape or value.dtype != self._number:
                 raise InputError(f"{what}: must have {len(kept)} numbers of type {self._dtype}")
             return value
-        if np.ndim(value) == 0:
-            kept.fill_(float(value))
+        numbers = numbers_of_drives(what, value, len(kept), each).astype(self._dtype)
+        if len(numbers) == 1:
+            kept.fill_(numbers[0])
         else:
-            kept.assign(np.broadcast_to(np.asarray(value, dtype=self._dtype), kept.shape))
+            kept.assign(numbers)
         return kept
 
 

@@ -13,6 +13,7 @@ from ..inputs.quantities import Count
 from ..inputs.validation import listed, shown
 from ..mujoco.attaching import alone_on_joint
 from ..mujoco.joints import compiled, mass_matrix, refuse_slide
+from ..simulation.batches.batch_parameters import mask_of_drives
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives
 
@@ -109,12 +110,10 @@ class Joints:
         if isinstance(commands, Mapping):
             given = dict(commands)
         else:
-            values = np.asarray(commands, dtype=float)
-            if values.shape != (self._worlds, len(self.names)):
-                raise InputError(
-                    f"commands: have the shape {values.shape} and need ({self._worlds}, {len(self.names)})"
-                )
-            given = dict(zip(self.names, values.T, strict=True))
+            need_shape = self._worlds, len(self.names)
+            if np.shape(commands) != need_shape:
+                raise InputError(f"commands: have the shape {np.shape(commands)} and need {need_shape}")
+            given = dict(zip(self.names, np.transpose(commands), strict=True))
         if set(given) != set(self.names):
             raise InputError(f"commands: are for {listed(given)}, and the joints are {listed(self.names)}")
         return given
@@ -128,9 +127,7 @@ class Joints:
         which
             Array of Booleans with the worlds that are meant; default all.
         """
-        mask = np.ones(self._worlds, dtype=bool) if which is None else np.asarray(which, dtype=bool)
-        if mask.shape != (self._worlds,):
-            raise InputError(f"which: must be an array of {self._worlds} Booleans, one for each world")
+        mask = np.ones(self._worlds, dtype=bool) if which is None else mask_of_drives(which, self._worlds, "world")
         for group in self._groups:
             both = np.tile(mask, len(group.names))
             group.drives.reset(both)
@@ -171,7 +168,7 @@ class _Group:
 
     def command(self, k: int, given: Any, worlds: int) -> None:
         place = self.rows(self._commands, k, worlds)
-        found = self.drives._input(f"commands.{self.names[k]}", given, place)
+        found = self.drives._input(f"commands.{self.names[k]}", given, place, "world")
         if found is not place:
             self.drives._wp.copy(place, found)
 

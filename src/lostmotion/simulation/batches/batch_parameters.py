@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from typing import Any
 
 import numpy as np
 
+from ...errors import InputError
 from ...inputs.implausible_values import trusted
+from ...inputs.validation import shown
 from ..runs.sensitivities import value_at
 from ..scenario.scenario import Scenario
 
@@ -80,3 +83,45 @@ def check_range(scenario: Scenario, columns: Mapping[str, np.ndarray]) -> None:
     with trusted():
         for pick in (np.min, np.max) if columns else ():
             scenario.replace(**{key: float(pick(column)) for key, column in columns.items()})
+
+
+def varied_columns(
+    scenario: Scenario, vary: Mapping[str, Any], count: int, generator: np.random.Generator
+) -> dict[str, np.ndarray]:
+    """Check what varies from drive to drive; values by key, each with one number for each drive.
+
+    Raises InputError: a key is unknown, an array has another shape or a value is out of its range.
+    """
+    columns = {}
+    for key, value in vary.items():
+        value_at(scenario, key, "vary")
+        column = value(generator, count) if callable(value) else value
+        columns[key] = np.broadcast_to(numbers_of_drives(f"vary.{key}", column, count), (count,))
+    check_range(scenario, columns)
+    return columns
+
+
+def numbers_of_drives(name: str, value: Any, count: int, each: str = "drive") -> np.ndarray:
+    """Check one number, or an array with one for each drive, and return it as an array.
+
+    Raises InputError: the shape is another one, or a number is not finite.
+    """
+    try:
+        numbers = np.ascontiguousarray(value, dtype=float).reshape(-1) if np.ndim(value) < 2 else None
+    except (TypeError, ValueError):
+        numbers = None
+    if numbers is None or len(numbers) not in (1, count) or np.iscomplexobj(value):
+        raise InputError(
+            f"{name}: {shown(value)} must be a number, or an array of {count} numbers, one for each {each}"
+        )
+    if not np.isfinite(numbers).all():
+        raise InputError(f"{name}: has numbers that are not finite; give finite ones")
+    return numbers
+
+
+def mask_of_drives(which: Any, count: int, each: str = "drive") -> np.ndarray:
+    """Check an array of Booleans, one for each drive. Raises InputError: it is something else."""
+    mask = np.asarray(which)
+    if mask.dtype != bool or mask.shape != (count,):
+        raise InputError(f"which: {shown(which)} must be an array of {count} Booleans, one for each {each}")
+    return np.ascontiguousarray(mask)

@@ -18,13 +18,12 @@ from ...inputs.validation import did_you_mean, listed, shown
 from ...model.drive import Drive
 from ...model.train import DriveTrain
 from ..forms.given_motion import check_motion
-from ..runs.sensitivities import value_at
 from ..scenario.requirements import need_ideal_current
 from ..scenario.scenario import Scenario
 from ..stepping.load_answers import LoadAnswer
 from ..stepping.step_inputs import MAX_INTERVAL, MIN_INTERVAL, no_input
 from ..variables_of_trains import only_input
-from .batch_parameters import BatchParameters, check_range
+from .batch_parameters import BatchParameters, mask_of_drives, numbers_of_drives, varied_columns
 from .exact_batches import ExactBatch
 from .walked_batches import WalkedBatch
 
@@ -124,7 +123,7 @@ class SimulationBatch:
             self._count = len(scenarios)
         check_free(TRAIN_BYTES * self._count, f"count: {self._count:.3g} drives", "take several batches")
         scenarios, initial = _under(controllers, scenarios, self._count), _starts(scenarios, self._count)
-        columns = _columns(scenarios[0], vary or {}, self._count, np.random.default_rng(seed))
+        columns = varied_columns(scenarios[0], vary or {}, self._count, np.random.default_rng(seed))
         last = list(scenarios[0].train().shafts)[-1]
         self._given = last if given_motion is True else given_motion or None
         self._core: ExactBatch | WalkedBatch
@@ -287,7 +286,7 @@ class SimulationBatch:
 
     def _checked_inputs(self, inputs: Mapping[str, Any]) -> dict[str, np.ndarray]:
         """Inputs by name as the core takes them."""
-        values = {name: _numbers(name, value, self._count) for name, value in inputs.items()}
+        values = {name: numbers_of_drives(name, value, self._count) for name, value in inputs.items()}
         for name in values:
             if name not in self.inputs:
                 raise no_input(self._train, self.inputs, name)
@@ -316,7 +315,7 @@ class SimulationBatch:
         if motion is None:
             raise InputError('motion: is missing; give the speed at the end of the step, motion={"speed": ...}')
         check_motion("motion", motion)
-        return {key: _numbers(f"motion.{key}", value, self._count) for key, value in motion.items()}
+        return {key: numbers_of_drives(f"motion.{key}", value, self._count) for key, value in motion.items()}
 
     @checked
     def reset(self, which: Any = None, initial: Mapping[str, Any] | None = None) -> None:
@@ -336,20 +335,13 @@ class SimulationBatch:
         InputError
             A name is unknown, an array has another shape, or a rigid gearbox is to have a speed or a twist.
         """
-        mask = None
-        if which is not None:
-            mask = np.asarray(which)
-            if mask.dtype != bool or mask.shape != (self._count,):
-                raise InputError(
-                    f"which: {shown(which)} must be an array of {self._count} Booleans, one for each drive"
-                )
-            mask = np.ascontiguousarray(mask)
+        mask = None if which is None else mask_of_drives(which, self._count)
         values = {}
         for name, value in (initial or {}).items():
             if name not in self._core.states:
                 known = f"the states are {listed(self._core.states)}"
                 raise InputError(f"initial.{name}: is no state; {did_you_mean(name, self._core.states, known)}")
-            values[name] = np.broadcast_to(_numbers(f"initial.{name}", value, self._count), (self._count,))
+            values[name] = np.broadcast_to(numbers_of_drives(f"initial.{name}", value, self._count), (self._count,))
         self._core.reset(mask, values)
         self._time[slice(None) if mask is None else mask] = 0.0
 
@@ -448,29 +440,3 @@ def _count_of(count: int | None, vary: Mapping[str, Any]) -> int:
         if size != count:
             raise InputError(f"vary.{key}: has {size} values for {count} drives; give one for each drive")
     return count
-
-
-def _columns(
-    scenario: Scenario, vary: Mapping[str, Any], count: int, generator: np.random.Generator
-) -> dict[str, np.ndarray]:
-    """The values of what varies by key, checked."""
-    columns = {}
-    for key, value in vary.items():
-        value_at(scenario, key, "vary")
-        column = value(generator, count) if callable(value) else value
-        columns[key] = np.broadcast_to(_numbers(f"vary.{key}", column, count), (count,))
-    check_range(scenario, columns)
-    return columns
-
-
-def _numbers(name: str, value: Any, count: int) -> np.ndarray:
-    """One number, or one for each drive, as the core takes them."""
-    try:
-        numbers = np.ascontiguousarray(value, dtype=float).reshape(-1) if np.ndim(value) < 2 else None
-    except (TypeError, ValueError):
-        numbers = None
-    if numbers is None or len(numbers) not in (1, count) or np.iscomplexobj(value):
-        raise InputError(f"{name}: {shown(value)} must be a number, or an array of {count} numbers, one for each drive")
-    if not np.isfinite(numbers).all():
-        raise InputError(f"{name}: has numbers that are not finite; give finite ones")
-    return numbers
