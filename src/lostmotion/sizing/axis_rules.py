@@ -17,7 +17,7 @@ from ..model.linear import RatedScrew
 from ..model.motor import Motor
 from ..model.rack_and_belt import RatedBelt, RatedRack
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
-from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, widths, working_tension
+from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, tooth_shares, widths, working_tension
 from .catalogue_formulas import belt_force, buckling_force, compression_force, critical_speed, dn_speed, tooth_forces
 from .finding import Finding, Judgement, within
 from .life import HOUR, AxialLoad, axial_load, life_of_gearbox, screw_life
@@ -168,10 +168,9 @@ def stage_rules(motion: RequiredMotion, stage: Stage, wanted_life: float | None)
     """The rules of the stage of a linear axis for the motion of its slide."""
     if isinstance(stage, RatedScrew):
         return screw_rules(axial_load(motion), stage, wanted_life)
-    peak = float(np.abs(motion.torque).max())
     if isinstance(stage, RatedBelt):
-        return belt_rules(peak, stage)
-    return rack_rules(peak, stage)
+        return belt_rules(motion.torque, motion.speed, stage)
+    return rack_rules(float(np.abs(motion.torque).max()), stage)
 
 
 def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *, key: str = "screw") -> list[Finding]:
@@ -213,8 +212,8 @@ def screw_rules(load: AxialLoad, screw: RatedScrew, wanted_life: float | None, *
     return [*found, against("screw_speed", what, RPM * fastest, most, "rpm", name, lacks)]
 
 
-def belt_rules(peak: float, belt: RatedBelt, *, key: str = "belt") -> list[Finding]:
-    """Tension of a belt and the load of its teeth under the largest force of its slide [N].
+def belt_rules(force: np.ndarray, speed: np.ndarray, belt: RatedBelt, *, key: str = "belt") -> list[Finding]:
+    """Tension of a belt and the load of its teeth under the force of its slide over its speed [N, m/s].
 
     Ratings that its table does not give come from its profile and width. Sources: `catalogue_formulas.belt_force`,
     `catalogue_formulas.tooth_forces` and `belt_ratings`.
@@ -222,15 +221,27 @@ def belt_rules(peak: float, belt: RatedBelt, *, key: str = "belt") -> list[Findi
     key: table of the belt, for what is missing.
     """
     rated, in_mesh = of_profile(belt), belt.meshing()
+    force, rpm = np.abs(force), RPM * 2.0 * math.pi / belt.travel() * np.abs(speed)
+    peak, shares = float(force.max()), tooth_shares(belt.profile, rpm)
     what, name = "force of the belt, with pretension", "force of the belt in operation"
     strained = belt_force(peak, belt.pretension)
-    force = _rating("belt_force", what, strained, rated.rated_force, name, _needed(belt, "rated_force", key))
+    tension_found = _rating("belt_force", what, strained, rated.rated_force, name, _needed(belt, "rated_force", key))
     what, name = "circumferential force on the teeth of the belt", "force of the teeth in mesh"
     if rated.tooth_force is None and (tension := working_tension(belt)) is not None:
-        return [force, _worked(what, peak, tension, belt)]
-    limit = tooth_forces(rated.tooth_force, in_mesh) if rated.tooth_force and in_mesh else None
+        return [tension_found, _worked(what, peak, tension, belt)]
     lacks = f"{key}.teeth_in_mesh" if rated.tooth_force else _needed(belt, "tooth_force", key)
-    return [force, _rating("belt_teeth", what, peak, limit, name, lacks)]
+    if rated.tooth_force is None or in_mesh is None:
+        return [tension_found, _rating("belt_teeth", what, peak, None, name, lacks)]
+    limit = tooth_forces(rated.tooth_force, in_mesh)
+    if shares is None:
+        found = _rating("belt_teeth", what, peak, limit, name, lacks)
+        return [
+            tension_found,
+            found.noted(f"tooth_force holds at standstill; the largest speed is {rpm.max():.0f} rpm"),
+        ]
+    k = int(np.argmax(force / shares))
+    found = _rating("belt_teeth", what, float(force[k]), limit * float(shares[k]), name, lacks)
+    return [tension_found, found.noted(f"at {rpm[k]:.0f} rpm of its pulley")]
 
 
 def _rating(rule: str, what: str, force: float, limit: float | None, name: str, key: str) -> Finding:
@@ -243,8 +254,12 @@ def _needed(belt: RatedBelt, rating: str, key: str) -> str:
     """Keys that would give a rating of a belt."""
     if not belt.profile or belt.width is None:
         return f"{key}.{rating}, or {key}.{'width' if belt.profile else 'profile'},"
-    printed = ", ".join(f"{1e3 * width:g}" for width in widths(belt.profile))
-    there = f"sheets of {belt.profile} are {printed} mm wide" if printed else f"no sheet of {belt.profile} is at hand"
+    printed = ", ".join(f"{1e3 * width:g}" for width in widths(belt))
+    there = (
+        f"sheets of {belt.profile} are {printed} mm wide"
+        if printed
+        else f"no sheet of {belt.profile} with this pitch is at hand"
+    )
     return f"{key}.{rating} ({there})"
 
 

@@ -6,6 +6,8 @@ import math
 import re
 from functools import cache
 
+import numpy as np
+
 from ..data_sheets.linear_sheets import BeltSheet
 from ..data_sheets.records import catalogue
 from ..model.rack_and_belt import RatedBelt
@@ -31,13 +33,27 @@ WORKING_TENSION = {
 }
 SOURCE = "SDP/SI, Handbook D265, T-15"
 
+# Force that a tooth of 1 cm width carries [N/cm] over the speed of the small pulley [rpm]: T5 by Elatech (catalogue 2012, page 9), the others by Synchroflex
+# (catalogue, pages 45 to 69). GEN III carries 1.25 times as much (ATP10 1.1 times) and Elatech's AT5, ATL5 and AT20 3 % more, with the same shares.
+SPEEDS = (0.0, 100.0, 500.0, 1000.0, 1500.0, 2000.0, 3000.0, 4000.0, 6000.0, 8000.0, 10_000.0)
+TOOTH_FORCES = {
+    "T5": (24.70, 22.28, 18.45, 16.32, 15.00, 14.03, 12.65, 11.66, 10.24, 9.23, 8.44),
+    "AT3": (32.34, 30.80, 26.91, 24.09, 22.16, 20.70, 18.53, 16.93, 14.62, 12.94, 11.63),
+    "AT5": (35.3, 33.5, 29.0, 25.7, 23.5, 21.9, 19.42, 17.61, 15.00, 13.11, 11.63),
+    "AT10": (73.5, 68.7, 57.4, 49.5, 44.3, 40.3, 34.5, 30.3, 24.2, 19.77, 16.32),
+    "AT20": (147.0, 134.9, 107.2, 88.4, 76.0, 66.7, 53.1, 43.2, 28.9),
+    "ATP10": (95.5, 89.28, 74.54, 64.33, 57.51, 52.40, 44.87, 39.36, 31.42, 25.69, 21.21),
+}
+
 
 def of_profile(belt: RatedBelt) -> RatedBelt:
     """The belt with the ratings that sheets of its profile and width print: of several the least.
 
     Those that it has remain. Without such a sheet it is returned as it is.
     """
-    sheets = [sheet for sheet in _sheets(_spelling(belt.profile)) if _same(sheet.width, belt.width)]
+    sheets = [
+        sheet for sheet in _sheets(_spelling(belt.profile)) if _same(sheet.width, belt.width) and _fits(sheet, belt)
+    ]
     found = {}
     for key in ("rated_force", "tooth_force"):
         printed = [value for sheet in sheets if (value := getattr(sheet, key)) is not None]
@@ -50,7 +66,7 @@ def working_tension(belt: RatedBelt) -> float | None:
     """Allowable working tension [N] of a belt, in proportion to its width; None where it is not known."""
     if belt.width is None or not belt.profile:
         return None
-    pitch = belt.pitch or (None if belt.teeth is None else belt.travel() / belt.teeth)
+    pitch = _pitch(belt)
     family = re.match(r"[A-Z]+2?", _spelling(belt.profile))
     if pitch is None or family is None:
         return None
@@ -59,9 +75,28 @@ def working_tension(belt: RatedBelt) -> float | None:
     return None if tension is None else tension * belt.width / INCH
 
 
-def widths(profile: str) -> list[float]:
-    """Widths of a profile for which the catalogue has a sheet [m]."""
-    return sorted({sheet.width for sheet in _sheets(_spelling(profile)) if sheet.width is not None})
+def tooth_shares(profile: str, rpm: np.ndarray) -> np.ndarray | None:
+    """Share of the tooth force at standstill that is left at speeds of the small pulley; None of a profile whose table is not known."""
+    forces = TOOTH_FORCES.get(_spelling(profile).removesuffix("GENIII").replace("ATL", "AT"))
+    if forces is None:
+        return None
+    shares: np.ndarray = np.interp(rpm, SPEEDS[: len(forces)], forces) / forces[0]
+    return shares
+
+
+def widths(belt: RatedBelt) -> list[float]:
+    """Widths of the profile and pitch of a belt of which a sheet is in the catalogue [m]."""
+    sheets = (sheet for sheet in _sheets(_spelling(belt.profile)) if _fits(sheet, belt))
+    return sorted({sheet.width for sheet in sheets if sheet.width is not None})
+
+
+def _pitch(belt: RatedBelt) -> float | None:
+    return belt.pitch or (None if belt.teeth is None else belt.travel() / belt.teeth)
+
+
+def _fits(sheet: BeltSheet, belt: RatedBelt) -> bool:
+    """Whether a belt may have the pitch of a sheet."""
+    return sheet.pitch is None or (pitch := _pitch(belt)) is None or _same(sheet.pitch, pitch)
 
 
 @cache

@@ -127,7 +127,7 @@ def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
         output_torque=torque,
     )
     peak = float(abs(result[torque]).max())
-    findings = _of_slide(scenario, name, peak) if train.is_slide(gear.output) else loads(gear, peak, cycle, where)
+    findings = _of_slide(scenario, name, result) if train.is_slide(gear.output) else loads(gear, peak, cycle, where)
     if gear.rated_input_speed is not None or gear.limits is not None:
         findings += input_speeds(gear, cycle, where)
     if train.fixed_gears() == train.gears:  # else what its load drives has no verdict
@@ -135,13 +135,19 @@ def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     return [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
 
 
-def _of_slide(scenario: Scenario, name: str, peak: float) -> list[Finding]:
-    """The rules of a rack or a belt under the largest force of its slide [N]. A screw has rules of its own."""
+def _of_slide(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
+    """The rules of a rack or a belt under the force of its slide [N]. A screw has rules of its own."""
     kind = scenario.kind_of(name)
     if kind == "screw":
         return []
     drive, key = getattr(scenario, f"{kind}s")[name], scenario.key_in_file(f"{kind}s.{name}")
-    return belt_rules(peak, drive, key=key) if kind == "belt" else rack_rules(peak, drive, key=key)
+    train = scenario.train()
+    force, speed = (
+        result[train.variable(*of)] for of in ((name, "output_torque"), (train.gears[name].output, "speed"))
+    )
+    if kind == "belt":
+        return belt_rules(force, speed, drive, key=key)
+    return rack_rules(float(np.abs(force).max()), drive, key=key)
 
 
 def _screw(scenario: Scenario, name: str, screw: RatedScrew, result: RunArrays) -> list[Finding]:
