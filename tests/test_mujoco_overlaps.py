@@ -115,6 +115,60 @@ def test_cogging_on_the_joint_and_unbalance_of_the_motor_are_no_weight_of_the_ro
     assert sorted(arm.drives["arm"].angle_torques) == ["cogging", "unbalance"]
 
 
+GEARS = {"g": {"input": "motor", "output": "flange", "ratio": RATIO}}
+SHAFTS = {"motor": {}, "flange": {"inertia": 0.9 * INERTIA}, "arm": {"inertia": 0.1 * INERTIA}}
+BEFORE = {
+    "coupling": (SHAFTS, {"gears": GEARS | {"c": {"input": "flange", "output": "arm", "ratio": -1.0}}}, {"gravity": {"w": WEIGHT | {"shaft": "flange"}}}),
+    "clutch": (SHAFTS, {"gears": GEARS, "clutches": {"c": {"input": "flange", "output": "arm", "torque": 30.0, "kind": "safety"}}}, {"gravity": {"w": WEIGHT | {"shaft": "flange"}}}),
+    "gear": ({"motor": {}, "arm": {"inertia": INERTIA}}, {}, {"angle_torques": {"w": CURVE | {"shaft": "motor", "period": RATIO * 2 * math.pi, "angles": [RATIO * a for a in POINTS]}}}),
+    "belt": (SHAFTS, {"gears": GEARS | {"c": {"input": "flange", "output": "arm", "ratio": 3.0}}}, {"angle_torques": {"w": CURVE | {"shaft": "flange", "period": 6 * math.pi, "angles": [3 * a for a in POINTS]}}}),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("joined", BEFORE)
+def test_a_weight_on_a_shaft_that_turns_with_the_joint_is_refused_or_left_to_the_robot(joined: str) -> None:
+    shafts, parts, weight = BEFORE[joined]
+    given, plain = scenario(shafts=shafts, **parts, **weight), scenario(shafts=shafts, **parts)
+    with pytest.raises(lm.InputError, match="would count twice") as caught:
+        lm.mujoco.attach(model(), {"arm": given})
+    assert caught.value.problems[0].keys == (f"{next(iter(weight))}.w",)
+    assert crossing(lm.mujoco.attach(model(), {"arm": given}, replace=True)) == crossing(lm.mujoco.attach(model(), {"arm": plain}))
+
+
+def test_loads_before_a_joint_and_on_a_slide_are_named_by_the_keys_of_the_file() -> None:
+    motor, moved = (
+        {"kind": "torque_source", "rotor_inertia": 1e-5},
+        "<joint name='arm' type='slide' axis='0 0 1'/><geom size='.1' mass='3'/>",
+    )
+    robot = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><body>{moved}</body></worldbody></mujoco>")
+    for key, value in {"inclination": 0.5 * math.pi, "force": 5.0}.items():
+        axis = {"motor": motor, "screw": {"lead": 0.01}, "slide": {"mass": 3.0, key: value}}
+        given = lm.Scenario(axis=axis, simulation={"duration": 1.0, "sample_interval": 1e-3})
+        with pytest.raises(lm.InputError, match="would count twice") as caught:
+            lm.mujoco.attach(robot, {"arm": given})
+        assert caught.value.problems[0].keys == (f"axis.slide.{key}",)
+        arm = lm.mujoco.attach(robot, {"arm": given}, replace=True)
+        arm.step()
+        # The fall of 3 kg that turn a rotor by a screw: semi-implicit steps of MuJoCo's 2 ms.
+        assert arm.data.qvel[0] == pytest.approx(-2e-3 * 9.81 * 3.0 / (3.0 + 1e-5 * (2 * math.pi / 0.01) ** 2), rel=1e-9)
+
+
+def test_end_stops_of_joint_and_drive_are_refused_or_those_of_the_drive_stay() -> None:
+    k, stopped = (
+        50.0,
+        {"motor": {}, "arm": {"inertia": INERTIA, "viscous_friction": 2.0, "end_stops": {"lower": -2.0, "upper": 0.5, "stiffness": 50.0}}},
+    )
+    limited = model(joint='limited="true" range="-114 28"')
+    with pytest.raises(lm.InputError, match="has range, which would count twice"):
+        lm.mujoco.attach(limited, {"arm": scenario(shafts=stopped)})
+    assert lm.mujoco.attach(limited, {"arm": scenario()}).model.jnt_limited[0]
+    arm = lm.mujoco.attach(limited, {"arm": scenario(shafts=stopped)}, replace=True)
+    for _ in range(5000):
+        arm.step([0.1])
+    q = arm.data.qpos[0]  # At rest the motor's torque is that of weight and stop.
+    assert MASS * G * RADIUS * math.sin(q) + k * (q - 0.5) == pytest.approx(RATIO * 0.1, rel=1e-9)
+
+
 def test_springs_of_joint_and_drive_are_refused_or_those_of_the_drive_stay() -> None:
     spring = {"end": {"shaft": "arm", "stiffness": {"kind": "linear", "stiffness": 2.0}}}
     sprung = model(joint='stiffness="3"')

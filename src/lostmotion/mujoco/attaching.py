@@ -108,8 +108,8 @@ def attach(
         By the name of a joint: a controller for its drive, which acts at its own sample instants within the steps.
     replace
         Take what would count twice off. These joints lose what describes a drive in MuJoCo: armature, damping, friction loss,
-        actuators and the limit of their torque, and with a spring in the drive their stiffness. The drives lose load torques, and on the shaft of the
-        joint gravity and torques once a turn, which the robot has.
+        actuators and the limit of their torque, with a spring in the drive their stiffness, and with end stops in the drive their range.
+        The drives lose load torques, inclinations, and gravity and torques once a turn of the joint, which the robot has.
     substeps
         Substeps of the drives within a step; left out, chosen by the natural frequency of the stiffest mesh.
 

@@ -6,6 +6,7 @@ import cmath
 import math
 from typing import TYPE_CHECKING, Any
 
+from ..control.turning import turns
 from ..errors import InputError
 from ..inputs.named_elements import Named
 from ..model.angle_torques import PeriodicTorque
@@ -30,19 +31,18 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
 
     Raises InputError: the drive has such, and it is not to be replaced.
     """
-    inclined = inclination_of(name, drive)
-    weights = inclined or (weights_of(name, drive) if weighs else [])
-    keys = [*loads_of(drive), *weights]
+    inclined = inclinations_of(drive)
+    weights = weights_of(name, drive) if weighs else []
+    keys = [*loads_of(drive), *inclined, *weights]
     if keys and not replace:
         raise InputError(
             "would count twice: load and weight of the joint come from the robot; give replace=True, or leave it out",
             *keys,
             where=f"joint {name!r}",
         )
+    drive = drive.replace(**dict.fromkeys(inclined, 0.0))  # load torques of scenarios are not used
     if not weights:
-        return drive  # load torques of scenarios are not used
-    if inclined:
-        return drive.replace(**dict.fromkeys(inclined, 0.0))
+        return drive
     changed = {
         table: Named({key: part for key, part in getattr(drive, table).items() if f"{table}.{key}" not in weights})
         for table in {key.partition(".")[0] for key in weights}
@@ -51,41 +51,50 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
 
 
 def loads_of(drive: Scenario) -> list[str]:
-    """Keys of the load torques of a scenario."""
-    train = drive.train()
+    """Keys of the load torques and forces of a scenario."""
+    tables = drive.tables
+    loads = {f"shafts.{name}.torque": shaft.torque for name, shaft in tables.shafts.items()}
+    forces = {f"slides.{name}.force": slide.force for name, slide in tables.slides.items()}
     return [
-        drive.input_key(train.variable(shaft, "load_torque"))
-        for shaft, signal in drive.tables.loads().items()
-        if signal != type(signal)()
+        drive.key_in_file(key)
+        for key, signal in (loads | forces).items()
+        if signal is not None and signal != type(signal)()
     ]
 
 
 def weights_of(name: str, drive: Scenario) -> list[str]:
-    """Keys of what may be a weight on the shaft of the joint."""
+    """Keys of what may be a weight on the joint: on its shaft, or on one that turns with it."""
     train = drive.train()
-    torques = [(key, part) for key, part in train.on_shafts() if isinstance(part, PeriodicTorque)]
-    shaft = output_of(name, train)
-    return [key for key, part in torques if part.shaft == shaft and _turns_once(part)]  # type: ignore[attr-defined]
+    end, found = output_of(name, train), []
+    for key, part in train.on_shafts():
+        if isinstance(part, PeriodicTorque) and not train.is_slide(part.shaft):  # type: ignore[attr-defined]
+            ratio = turns(train, part.shaft, end)  # type: ignore[attr-defined]
+            found += [key] if ratio is not None and _turns_once(part, ratio) else []
+    return found
 
 
-def inclination_of(name: str, drive: Scenario) -> list[str]:
-    """Key of the inclination of the slide of a joint, whose weight is a load of the scenario."""
-    shaft = output_of(name, drive.train())
-    slide = drive.tables.slides.get(shaft)
-    return [drive.key_in_file(f"slides.{shaft}.inclination")] if slide is not None and slide.inclination != 0.0 else []
+def inclinations_of(drive: Scenario) -> list[str]:
+    """Keys of the inclinations of slides, whose weights are loads of the scenario."""
+    slides = drive.tables.slides
+    return [
+        drive.key_in_file(f"slides.{name}.inclination") for name, slide in slides.items() if slide.inclination != 0.0
+    ]
 
 
-def _turns_once(torque: PeriodicTorque) -> bool:
-    """Whether a torque over the angle has a part of first order, as weights have."""
+def _turns_once(torque: PeriodicTorque, ratio: float) -> bool:
+    """Whether a torque over the angle of a shaft has a part of first order in the angle of the joint, as weights have.
+
+    ratio: turns of the shaft for one of the joint.
+    """
     order = getattr(torque, "order", None)
     if order is not None:
-        return bool(abs(order) == 1.0)
-    turns = getattr(torque, "period", 2.0 * math.pi) / (2.0 * math.pi)
-    if abs(turns - round(turns)) > 1e-9 * turns or round(turns) < 1:
+        return math.isclose(abs(order * ratio), 1.0, rel_tol=1e-9)
+    turned = abs(getattr(torque, "period", 2.0 * math.pi) / (2.0 * math.pi * ratio))
+    if abs(turned - round(turned)) > 1e-9 * turned or round(turned) < 1:
         return False
-    curve, count = torque.core(), POINTS * round(turns)
-    angles = [2.0 * math.pi * (k + 0.5) / POINTS for k in range(count)]
-    values = [curve(angle) for angle in angles]
+    curve, count = torque.core(), POINTS * round(turned)
+    angles = [2.0 * math.pi * (k + 0.5) / POINTS for k in range(count)]  # of the joint
+    values = [curve(angle * ratio) for angle in angles]
     first = sum(value * cmath.exp(1j * angle) for value, angle in zip(values, angles, strict=True))
     return bool(2.0 * abs(first) / count > SHARE_OF_WEIGHT * max(map(abs, values)))
 
@@ -105,8 +114,12 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -
         "frictionloss": [(model.dof_frictionloss, dof)],
         "actuatorfrcrange": [(model.jnt_actfrclimited, joint)],
     }
-    if _has_spring(name, drive):
+    train = drive.train()
+    end = output_of(name, train)
+    if any(spring.shaft == end for spring in train.springs.values()):
         values["stiffness"] = [(array, joint) for array in (model.jnt_stiffness, model.jnt_stiffnesspoly)]
+    if train.shafts[end].end_stops is not None:
+        values["range"] = [(model.jnt_limited, joint)]
     own = [key for key, places in values.items() if any((array[k] != 0).any() for array, k in places)]
     own += [f"the {actuator_name(model, k)}" for k in actuators]
     if own and not replace:
@@ -137,9 +150,3 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -
             model.actuator_dampingpoly,
         ):
             array[k] = 0.0
-
-
-def _has_spring(name: str, drive: Scenario) -> bool:
-    train = drive.train()
-    shaft = output_of(name, train)
-    return any(spring.shaft == shaft for spring in train.springs.values())
