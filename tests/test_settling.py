@@ -151,6 +151,30 @@ def test_a_load_that_varies_over_time_is_no_cycle() -> None:
     assert move.to == 0.5
 
 
+@pytest.mark.parametrize(("share", "state"), [(0.99, "settled, not proved"), (2.0, "settled")])
+def test_a_rest_within_a_window_finer_than_the_encoder_is_no_proof(share: float, state: str) -> None:
+    """A rack under friction, whose scale has steps of 187 nm: with pauses of 50 ms it rests 82 nm below its goal, with 51 ms 90 nm above."""
+    motor = {"kind": "torque_source", "rotor_inertia": 2.3e-5, "rated_torque": 0.0155}
+    rack = {"travel_per_turn": 0.2, "stiffness": 725.7, "damping": 0.0567}
+    axis = {"motor": motor, "rack": rack, "slide": {"mass": 0.02956, "friction_force": 0.001}}
+    moves = {"kind": "position", "speed": 2.06e-3, "acceleration": 0.01363, "jerk": 1.2728, "moves": [{"to": 6.36e-4}, {"to": 0.0}]}
+    controller = {
+        "sample_time": 1e-3,
+        "encoder": {"bits": 16},
+        "position_encoder": {"grating_period": 47.8e-6, "bits": 8},
+        "position": {"gain": 5.66},
+        "speed": {"gain": 1.45e-3, "integral_time": 0.314, "torque_limit": 0.0465},
+    }
+    step, rests = 47.8e-6 / 256, []
+    for dwell in (0.05, 0.051):
+        reference = {"reference": moves | {"dwell": dwell}}
+        simulation = {"duration": 1.0, "sample_interval": 1e-3}
+        last = judged(lm.Scenario(axis=axis, controller=controller | reference, simulation=simulation), share * step)[1][-1]
+        assert (last.state, last.reason[:7]) == (state, "at rest")
+        rests.append(last.remaining)
+    assert share > 1.0 or abs(rests[0] - rests[1]) > 0.5 * step
+
+
 def test_a_window_may_be_given_in_the_unit_of_the_shaft_that_it_is_of() -> None:
     slide = slide_axis(SCREW)
     assert lm.commission(slide, window="5 um").window == pytest.approx(5e-6, rel=1e-12)

@@ -45,7 +45,7 @@ class Settling:
     """position [rad], of a slide [m]"""
     state: State
     """settled where the error is proved to stay within the window; settled, not proved where it was only watched to do so in steady
-    swings; not settled where it is outside at the end of what was run"""
+    swings, or rests within a window that is finer than a step of the position's encoder; not settled where it is outside at the end of what was run"""
     time: float
     """until the error stays within the window [s]; NaN unless settled, proved or not"""
     last: bool
@@ -336,9 +336,15 @@ def _within(
 ) -> tuple[State, str]:
     """Whether an error that was seen to remain within the window stays there, and the reason.
 
-    Rest is a proof. A steady swing is none: a quantised loop may be chaotic, and its state never repeats.
+    Rest is a proof, if the encoder of the position resolves the window: where an axis rests within a step depends on how it came there.
+    A steady swing is none: a quantised loop may be chaotic, and its state never repeats.
     """
     if rest.verdict == "at rest" and covers:
+        if window < moves.axis.position_encoder[1]:
+            return (
+                "settled, not proved",
+                "at rest, by chance: the window is finer than a step of the position's encoder",
+            )
         return "settled", "at rest"
     name, watched = moving_input(moves.axis.scenario), float(after[-1])
     if covers and _swings_within(error, window):
