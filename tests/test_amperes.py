@@ -14,7 +14,7 @@ from lostmotion.data_sheets.records import catalogue
 from lostmotion.model.duty import Amplifier
 from lostmotion.reports.listing import record_text
 from lostmotion.servo.tuning import drive_units
-from lostmotion.sizing.supply import amperes, amplifier_rules
+from lostmotion.sizing.supply import amplifier_rules
 from lostmotion.studies.selection.task_file import task_of
 
 GAIN = 0.48  # N·m/(rad/s), of scenarios/field-weakening.toml
@@ -64,8 +64,37 @@ def test_the_amplifier_of_a_synchronous_motor_is_compared_in_amperes_rms() -> No
     motor = lm.load("field-weakening").motors["m"]
     amplifier = Amplifier(continuous_current=5.0, peak_current=10.0)
     time, current = np.linspace(0.0, 1.0, 11), np.full(11, 4.0)
-    found = amplifier_rules(time, current, 1.0, amplifier, None, unit=amperes(motor))
+    found = amplifier_rules(time, current, 1.0, amplifier, None, motor)
     assert [f.value for f in found] == ["4 of 5 A rms", "4 of 10 A rms"]
+
+
+def test_the_phase_current_of_a_check_has_the_part_that_weakens_the_field() -> None:
+    """i_d^2 + i_q^2 of the run, of which the torque tells i_q alone; the torque that heats alike is k_T to its rms."""
+    scenario = lm.load("field-weakening").replace(**{"task.amplifier": {"continuous_current": 5.0, "peak_current": 11.0}})
+    result = lm.simulate(scenario)
+    rms = np.hypot(result["m_direct_current"], result["m_quadrature_current"]).values / math.sqrt(2.0)
+    found = {f.rule: f for f in lm.check_drive(scenario)}
+    read = {
+        rule: float(re.match(r"[\d.]+", found[rule].value)[0])
+        for rule in ("current", "amplifier_peak", "amplifier_current", "motor_torque")
+    }  # type: ignore[index]
+    assert float(np.abs(result["m_torque"]).max()) / RMS < 0.85 * rms.max()
+    assert read["current"] == pytest.approx(rms.max(), rel=5e-3)  # the check samples more finely
+    assert (read["amplifier_peak"], found["amplifier_peak"].verdict) == (pytest.approx(rms.max(), rel=5e-3), "warning")
+    whole = math.sqrt(float(np.mean(rms**2)))
+    assert read["amplifier_current"] == pytest.approx(whole, rel=1e-2)
+    moving = result["time"].values <= 0.479  # the motion of the run; the rest is standstill
+    assert read["motor_torque"] == pytest.approx(RMS * math.sqrt(float(np.mean(rms[moving] ** 2))), rel=2e-2)
+
+
+def test_the_amplifier_of_a_torque_source_is_compared_in_the_amperes_of_its_torque_constant() -> None:
+    """Amplitudes or effective values: only the sheet with that constant tells."""
+    limits = {"torque_constant": 0.5, "max_current": 8.0}
+    motor = lm.Motor(kind="torque_source", rotor_inertia=1e-4, rated_torque=1.0, limits=limits)
+    found = amplifier_rules(
+        np.linspace(0.0, 1.0, 11), np.full(11, 4.0), 1.0, Amplifier(continuous_current=5.0, peak_current=10.0), None, motor
+    )
+    assert all(f.what.endswith("in the amperes of motor.limits.torque_constant") for f in found)
 
 
 def test_currents_and_voltages_of_a_selection_are_effective_values_beside_amplitudes() -> None:

@@ -26,7 +26,7 @@ class LinearMotorData(Part):
     rated_force: Annotated[Force, Positive] | None = None  #: force at command 1
     peak_force: Annotated[Force, Positive] | None = None  #: at which the force ends; left out, without limit
     force_constant: Annotated[float, Unit("N/A"), Positive] | None = None
-    """force to the current in the unit of the currents"""
+    """force to one ampere, rms or amplitude as the currents beside it"""
     rated_current: Annotated[Current, Positive] | None = None  #: with force_constant, in place of rated_force
     peak_current: Annotated[Current, Positive] | None = None  #: with force_constant, in place of peak_force
     friction_force: Annotated[Force, NotNegative] = 0.0  #: dry friction

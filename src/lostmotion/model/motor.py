@@ -58,9 +58,11 @@ class MotorLimits(MotorHeat):
     resistance: Annotated[Resistance, Positive] | None = None
     """resistance of the winding, at 25 °C"""
     torque_constant: Annotated[TorqueConstant, Positive] | None = None
-    """torque to one ampere of the armature, or to one ampere rms"""
+    """torque to one ampere of the armature; with one to an ampere rms of a phase only currents are judged rightly: voltage and heat
+    are R I + k w and R I^2 of a DC motor, and those of a phase take a `winding`"""
     max_voltage: Annotated[Voltage, Positive] | None = None
-    """voltage limit of the amplifier of a torque source; a DC motor has `voltage_limit`"""
+    """voltage limit of the amplifier of a torque source, for R I + k w with resistance and torque_constant; a DC motor has
+    `voltage_limit`"""
     max_current: Annotated[Current, Positive] | None = None
     """smaller limit of motor and amplifier, in the amperes of torque_constant"""
     max_inertia_ratio: Annotated[Number, Positive] | None = None

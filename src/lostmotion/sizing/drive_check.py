@@ -27,7 +27,7 @@ from .motor_run import oriented_amplitudes
 from .power_off import holdings
 from .rules_of_one_axis import axis_rules
 from .stepper_check import speed_of_stepper, stepper_rules
-from .supply import amplifier_of_a_run, bus_findings, power_in_run
+from .supply import amplifier_of_a_run, bus_findings, effective_current, power_in_run
 
 POINTS = 40  # samples to a period of the fastest resonance, so that no peak is missed
 SAMPLES = (2_000, 200_000)  # the fewest of a run, and the most at the finest interval
@@ -111,8 +111,10 @@ def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
         return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
     ((name, motor),) = train.motors.items()
     torque, speed = result[train.variable(name, "torque")], result[train.variable(motor.shaft, "speed")]
+    oriented = oriented_amplitudes(scenario, result, name)
+    current = effective_current(motor, torque, speed, None if oriented is None else oriented[0])
     where = scenario.key_in_file(scenario.motor_key(name))
-    return amplifier_of_a_run(result, motor, torque, speed, scenario.task, where)
+    return amplifier_of_a_run(result.time, current, motor, scenario.task, where)
 
 
 def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
@@ -199,17 +201,21 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
             *stepper_rules(scenario, name, result),
         ]
         return judged, np.zeros_like(result.time)
-    cycle = duty_cycle(result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque)
     command, T, w = (result[key] for key in (train.variable(name, "command"), torque, speed))
     command = command_of_run(motor, scenario.controllers.get(name), command, T, w)
-    oriented = oriented_amplitudes(scenario, result, name)
+    oriented, heating = oriented_amplitudes(scenario, result, name), None
+    if motor.winding is not None and oriented is not None:  # reluctance gives torque without heat
+        heating = np.maximum(np.abs(T), motor.winding.phase_values().torque_constant * np.abs(oriented[0]))
+    cycle = duty_cycle(
+        result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque, heating=heating
+    )
     slides = train.is_slide(motor.shaft)
     findings = [
         largest_speed(motor, float(abs(w).max()), where, slides=slides),
         *peak_torque(motor, T, where, slides=slides),
-        *heat(motor, cycle, scenario.task.ambient_temperature, where, slides=slides),
+        *heat(motor, cycle, scenario.task.ambient_temperature, where, slides=slides, whole=oriented is not None),
         voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
-        current(motor, T, where),
+        current(motor, T, where, oriented=None if oriented is None else oriented[0]),
     ]
     findings = [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
     if slides:

@@ -109,6 +109,7 @@ def duty_cycle(
     speed: str = "motor_speed",
     motor_torque: str = "motor_torque",
     output_torque: str = "output_torque",
+    heating: np.ndarray | None = None,
 ) -> DutyCycle:
     """The duty cycle of a run.
 
@@ -118,6 +119,7 @@ def duty_cycle(
     result: of `simulate`.
     period: `task.cycle` [s].
     speed, motor_torque, output_torque: variables of the result: the input shaft, what turns it, what leaves at the output.
+    heating: torque of the motor over the result that heats as its current does [N·m]; left out, its torque.
 
     Raises InputError: the motion does not fit into the period, or is not at its end where a pause would begin.
     """
@@ -130,6 +132,7 @@ def duty_cycle(
     before, after = first // 2 + 1, (last + len(fast)) // 2  # halves of the standstills, those far from the motion
     waits = time[first] - time[0] > shortest and np.ptp(torque[:before]) <= steady
     rests = not len(turning) or (time[-1] - time[last] > shortest and np.ptp(torque[after:]) <= steady)
+    torque = torque if heating is None else heating
     part = slice(max(first - 1, 0) if waits else 0, last + 2 if rests else len(fast))
     found = DutyCycle(
         time[part],

@@ -16,6 +16,8 @@ from .duty_cycle import DutyCycle
 from .finding import Finding, Judgement, within
 from .thermal import TwoBodies, mean_square, steady_rise
 
+WHOLE = ", that heats as the whole current"
+
 
 def largest_speed(m: Motor, speed: float, where: str = "motor", *, slides: bool = False) -> Finding:
     """speed: the largest of the run [rad/s], of a motor that moves a slide [m/s]. where: the table of the motor."""
@@ -47,10 +49,18 @@ def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor", *, slides: b
 
 
 def heat(
-    m: Motor, cycle: DutyCycle, ambient: float, where: str = "motor", *, rise: float | None = None, slides: bool = False
+    m: Motor,
+    cycle: DutyCycle,
+    ambient: float,
+    where: str = "motor",
+    *,
+    rise: float | None = None,
+    slides: bool = False,
+    whole: bool = False,
 ) -> list[Finding]:
     """Torque over the cycle, and the temperature of the winding at this ambient temperature [°C]. `rise` [K] is the
-    rise over it, if it is known already. `slides`: the motor moves a slide, by a force."""
+    rise over it, if it is known already. `slides`: the motor moves a slide, by a force. `whole`: the torque of the cycle heats as
+    the whole current does, under field-oriented control."""
     limits = m.limits
     word, unit = ("force", "N") if slides else ("torque", "N·m")
     torque = cycle.rms_motor_torque
@@ -59,7 +69,18 @@ def heat(
         continuous = m.rated_torque
     name = f"continuous {word} of the motor"
     key = f"{where}.limits.continuous_torque"
-    findings = [within("motor_torque", f"motor {word}, rms", torque, continuous, unit, name, key=key, cycle=cycle)]
+    findings = [
+        within(
+            "motor_torque",
+            f"motor {word}, rms{WHOLE if whole else ''}",
+            torque,
+            continuous,
+            unit,
+            name,
+            key=key,
+            cycle=cycle,
+        )
+    ]
     if limits is None or limits.max_winding_temperature is None or m.copper_loss() is None:
         return findings
     permissible = limits.max_winding_temperature
@@ -185,14 +206,21 @@ def voltage(
         return Finding("voltage", "voltage, largest", "not known", "unknown", missing)
     limit = (m.voltage_limit if m.kind == "dc" else None) or (limits.max_voltage if limits else None)
     key = f"{where}.voltage_limit" if m.kind == "dc" else f"{where}.limits.max_voltage"
-    return within("voltage", "voltage, largest", peak, limit, "V", "limit of the amplifier", key=key)
+    of = "" if m.kind == "dc" else f", of a DC motor with {where}.limits.torque_constant"
+    return within("voltage", f"voltage, largest{of}", peak, limit, "V", "limit of the amplifier", key=key)
 
 
-def current(m: Motor, torque: np.ndarray, where: str = "motor") -> Finding:
-    """The largest of the run."""
+def amperes_of(m: Motor, where: str) -> str:
+    """Addition to a current whose amperes only a torque constant tells: those of rms, of a peak or of dc."""
+    return f", in the amperes of {where}.limits.torque_constant" if m.kind != "dc" and m.winding is None else ""
+
+
+def current(m: Motor, torque: np.ndarray, where: str = "motor", *, oriented: np.ndarray | None = None) -> Finding:
+    """The largest of the run, for its torque [N·m]; under field-oriented control the one that a phase had [A], amplitude."""
     limits = m.limits
     if m.winding is not None:
-        rms = float(abs(torque).max()) / m.winding.phase_values().torque_constant / math.sqrt(2.0)
+        amplitude = torque / m.winding.phase_values().torque_constant if oriented is None else oriented
+        rms = float(abs(amplitude).max()) / math.sqrt(2.0)
         name, key = "limit of motor and amplifier", f"{where}.winding.max_current_rms"
         what = "current of a phase, largest, as effective value"
         return within("current", what, rms, m.winding.max_current, "A rms", name, key=key)
@@ -201,7 +229,4 @@ def current(m: Motor, torque: np.ndarray, where: str = "motor") -> Finding:
         return Finding("current", "current, largest", "not known", "unknown", missing)
     peak = float(abs(torque).max()) / limits.torque_constant
     name, key = "limit of motor and amplifier", f"{where}.limits.max_current"
-    what = (
-        "current, largest" if m.kind == "dc" else f"current, largest, in the amperes of {where}.limits.torque_constant"
-    )
-    return within("current", what, peak, limits.max_current, "A", name, key=key)
+    return within("current", f"current, largest{amperes_of(m, where)}", peak, limits.max_current, "A", name, key=key)

@@ -14,7 +14,7 @@ from ..inputs.validation import did_you_mean
 from ..model.motor import ShaftMotor
 from ..simulation.runs.results import RunArrays, scenario_of
 from ..simulation.scenario.scenario import Scenario
-from .motor_check import command_of_run, current_voltage_power
+from .motor_check import amperes_of, command_of_run, current_voltage_power
 from .thermal import COPPER, mean_square, need_two_bodies, rms
 from .torque_squares import squares_of
 
@@ -66,7 +66,8 @@ def motor_current(result: xarray.Dataset, motor: str | None = None) -> xarray.Da
             raise InputError(
                 f"motor_current: the motor lacks {scenario.motor_key(name)}.limits.torque_constant; give it, or a winding"
             )
-        found = {"current": (current, "A", "current of the armature")}
+        of = "current of the armature" if m.kind == "dc" else f"current{amperes_of(m, scenario.motor_key(name))}"
+        found = {"current": (current, "A", of)}
     else:
         found = {
             "current": (current, "A", f"current{' i_q' if oriented is None else ''}, amplitude of a phase"),

@@ -18,7 +18,7 @@ from .axis_rules import missing
 from .catalogue_formulas import bus_voltage, capacitor_energy
 from .duty_cycle import integral
 from .finding import Finding, within
-from .motor_check import current_voltage_power
+from .motor_check import amperes_of, current_voltage_power
 from .motor_run import phase_amplitudes
 from .required_motion import InputDemand
 
@@ -128,8 +128,8 @@ def amplifier_rules(
     cycle: float,
     amplifier: Amplifier,
     bus: float | None,
+    motor: Motor,
     where: str = "motor",
-    unit: str = "A",
 ) -> list[Finding]:
     """Rules of an amplifier: rms and largest current, the longest time above the continuous one, and the voltage of the bus.
 
@@ -139,23 +139,18 @@ def amplifier_rules(
         is not known.
     bus: largest voltage of the DC bus before energy returns [V].
     where: table of the motor.
-    unit: of the current: of a motor with a winding ``"A rms"``.
     """
+    of, unit = amperes_of(motor, where), "A" if motor.winding is None else "A rms"
     what, continuous = "current, rms over the cycle", amplifier.continuous_current
     if np.isnan(current).any():
         found = [missing("amplifier_current", what, f"{where}.limits.torque_constant")]
     else:
-        square = integral(time, current**2) / cycle
-        found = [
-            within(
-                "amplifier_current", what, math.sqrt(square), continuous, unit, "continuous current of the amplifier"
-            )
-        ]
+        rms, name = math.sqrt(integral(time, current**2) / cycle), "continuous current of the amplifier"
+        found = [within("amplifier_current", what + of, rms, continuous, unit, name)]
         if amplifier.peak_current is not None:
             peak, name = float(np.abs(current).max()), "peak current of the amplifier"
-            found.append(
-                within("amplifier_peak", "current of the amplifier, largest", peak, amplifier.peak_current, unit, name)
-            )
+            what = f"current of the amplifier, largest{of}"
+            found.append(within("amplifier_peak", what, peak, amplifier.peak_current, unit, name))
         if amplifier.peak_time is not None:
             longest = longest_above(time, np.abs(current), continuous)
             what, name = "longest time above the continuous current", "peak time of the amplifier"
@@ -169,15 +164,12 @@ def amplifier_rules(
 
 
 def amplifier_of_a_run(
-    result: RunArrays, motor: Motor, torque: np.ndarray, speed: np.ndarray, task: Task, where: str = "motor"
+    time: np.ndarray, current: np.ndarray, motor: Motor, task: Task, where: str = "motor"
 ) -> list[Finding]:
     """The rules of an amplifier for a run, over the cycle of the task, or repeated without a pause."""
     assert task.amplifier is not None
-    time, bus = result.time, None if task.supply is None else task.supply.start()
-    current = effective_current(motor, torque, speed)
-    return amplifier_rules(
-        time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus, where, amperes(motor)
-    )
+    bus = None if task.supply is None else task.supply.start()
+    return amplifier_rules(time, current, task.cycle or float(time[-1] - time[0]), task.amplifier, bus, motor, where)
 
 
 def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:
@@ -191,12 +183,14 @@ def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:
     return max(each, default=0.0)
 
 
-def amperes(motor: Motor) -> str:
-    """Unit of that current."""
-    return "A" if motor.winding is None else "A rms"
+def effective_current(
+    motor: Motor, torque: np.ndarray, speed: np.ndarray, oriented: np.ndarray | None = None
+) -> np.ndarray:
+    """Current of a motor [A], of one with a winding the effective value of a phase; NaN where its data do not tell.
 
-
-def effective_current(motor: Motor, torque: np.ndarray, speed: np.ndarray) -> np.ndarray:
-    """Current of a motor [A], of one with a winding the effective value of a phase; NaN where its data do not tell."""
-    current = current_voltage_power(motor, np.zeros_like(torque), torque, speed)[0]
+    oriented: amplitude of a phase under field-oriented control.
+    """
+    current = oriented
+    if current is None:
+        current = current_voltage_power(motor, np.zeros_like(torque), torque, speed)[0]
     return current if motor.winding is None else current / math.sqrt(2.0)

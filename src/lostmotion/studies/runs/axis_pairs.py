@@ -51,7 +51,7 @@ from ...sizing.required_motion import (
 )
 from ...sizing.stages import Stage, at_input, together
 from ...sizing.stepper_check import speed_of_stepper, stepper_rules
-from ...sizing.supply import amperes, amplifier_rules, effective_current, electrical_power, returned, supply_rules
+from ...sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ...worker_threads import thread_pool
 from ..study.drive_check_columns import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE, columns_of
 from ..study.drive_check_columns import TASK_COLUMNS as CHECKS
@@ -273,7 +273,7 @@ class Axes:
         if amplifier is not None:
             current = effective_current(motor, demand.motor_torque(motor), demand.speed)
             motion, bus = demand.motion, None if supply is None else supply.start()
-            found += amplifier_rules(motion.time, current, motion.cycle, amplifier, bus, unit=amperes(motor))
+            found += amplifier_rules(motion.time, current, motion.cycle, amplifier, bus, motor)
         if supply is None:
             return found
         used = ("voltage_limit", "capacitance", "brake_resistance", "brake_power")
@@ -401,8 +401,12 @@ class Axes:
                 rise=None if math.isnan(winding) else winding - task.ambient_temperature,
             ),
             voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1][here]),
-            current(m, torque),
+            current(m, torque, oriented=None if oriented is None else oriented[0][here]),
         ]
+        if oriented is not None and (amplifier := task.amplifier_of_task()) is not None:
+            time, bus = result.time[here], None if task.supply is None else task.supply.start()
+            whole = effective_current(m, torque, speed, oriented[0][here])
+            of_motor += amplifier_rules(time, whole, float(time[-1] - time[0]), amplifier, bus, m)
         return self._with_others(row, of_motor, made)
 
     def _with_others(self, row: np.ndarray, of_motor: list[Finding], made: Repeated) -> list[Finding]:
