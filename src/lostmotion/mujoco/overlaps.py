@@ -6,7 +6,7 @@ import cmath
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..control.turning import turns
+from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.named_elements import Named
 from ..model.angle_torques import PeriodicTorque

@@ -62,7 +62,7 @@ def power_in_run(
     if (amplitudes := phase_amplitudes(scenario, result, name)) is not None:
         i_d, i_q, u_d, u_q = amplitudes
         return np.asarray(1.5 * (u_d * i_d + u_q * i_q))
-    return current_voltage_power(scenario.motors[name], command, result[torque], result[speed])[2]
+    return current_voltage_power(scenario.train().motors[name], command, result[torque], result[speed])[2]
 
 
 def bus_findings(
