@@ -15,6 +15,7 @@ from ..errors import InputError, inside
 from ..inputs.core_parameters import Described, ReferenceBlocks
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor, MotorLaw
+from ..model.shaft_ratio import turns
 from ..model.signals import columns
 from ..model.train import DriveTrain
 from .continuous import ContinuousController
@@ -24,7 +25,6 @@ from .encoder import Encoder
 from .filters import discrete
 from .loops import CurrentLoop, FieldOriented, FirstOrderCurrent, SpeedLoop, VoltageCommand
 from .sample_times import whole_multiple
-from .shaft_ratio import turns
 
 BoundController = tuple[float, list[_core.Axis]]
 """shortest sample time [s], and the controllers with the numbers of their motors and shafts"""

@@ -28,6 +28,7 @@ from ..inputs.quantities import (
 )
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import Motor
+from ..model.shaft_ratio import turns
 from ..model.signals import Signal, Step
 from ..model.train import DriveTrain
 from ..recorded_numbers import numbers
@@ -36,7 +37,6 @@ from ..units.conversion import Unit
 from .command import CommandSignal
 from .firmware import Firmware
 from .loops import FirstOrderCurrent, IdealCurrent, VoltageCommand
-from .shaft_ratio import turns
 
 MAX_ORDER = 8  # of a state space
 

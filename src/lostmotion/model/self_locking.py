@@ -16,6 +16,7 @@ from ..inputs.quantities import Speed, Torque
 from ..inputs.validation import did_you_mean
 from .gear import Gear
 from .gearbox import Gearbox
+from .shaft_ratio import joints_of, tied
 from .torsion import Rigid
 from .train import DriveTrain
 
@@ -286,32 +287,15 @@ def _growth(names: list[str], rate: np.ndarray) -> tuple[list[complex], float]:
     return growing, undamped
 
 
-def _joints(train: DriveTrain) -> list[tuple[str, str, float]]:
-    """(input, output, ratio) of all that joins two shafts at a ratio."""
-    return [(g.input, g.output, g.ratio) for g in train.fixed_gears().values()] + train.held_together()
-
-
 def _speeds(train: DriveTrain, gear: Gear, speed: float) -> dict[str, float]:
     """Speeds of all shafts that turn with the input of a gear; what only a damper joins to them turns along without slip."""
     speeds: dict[str, float] = {}
     ends = [ends for d in train.dampers.values() for ends in ((d.input, d.output), (d.output, d.input))]
     dragged = [(gear.input, speed)]
     while dragged:
-        _turn(train, *dragged[0], speeds)
+        speeds = tied(speeds | dict(dragged[:1]), joints_of(train))
         dragged = [(there, speeds[here]) for here, there in ends if here in speeds and there not in speeds]
     return speeds
-
-
-def _turn(train: DriveTrain, shaft: str, speed: float, speeds: dict[str, float]) -> None:
-    """Sets the speeds of a shaft and of all that it is joined to."""
-    speeds[shaft], waiting = speed, [shaft]
-    while waiting:
-        shaft = waiting.pop()
-        for one, other, ratio in _joints(train):
-            for here, there, factor in ((one, other, 1.0 / ratio), (other, one, ratio)):
-                if here == shaft and there not in speeds:
-                    speeds[there] = factor * speeds[here]
-                    waiting.append(there)
 
 
 def _path(train: DriveTrain, gear: Gear) -> list[str]:
@@ -352,16 +336,8 @@ def _torques(train: DriveTrain, gear: str, path: list[str], at: Overrunning) -> 
 def _rigid_inertia(train: DriveTrain, core: _core.Train, gear: str, shaft: str) -> float:
     """Inertia [kg·m²] at a shaft, with all that rigid gears beside this one join to it."""
     inertias = {name: J for name, (J, _) in zip(train.shafts, core.shafts(), strict=True)}
-    factors, waiting = {shaft: 1.0}, [shaft]
-    while waiting:
-        here = waiting.pop()
-        for name, g in train.gears.items():
-            if name == gear or not isinstance(g.stiffness, Rigid) or here not in (g.input, g.output):
-                continue
-            other, factor = (g.output, 1.0 / g.ratio) if here == g.input else (g.input, g.ratio)
-            if other not in factors:
-                factors[other] = factor * factors[here]
-                waiting.append(other)
+    rigid = [g for name, g in train.gears.items() if name != gear and isinstance(g.stiffness, Rigid)]
+    factors = tied({shaft: 1.0}, [(g.input, g.output, g.ratio) for g in rigid])
     together = sum(inertias[name] * factor**2 for name, factor in factors.items())
     for one, other, coupling in train.inertia_couplings():
         together += 2.0 * coupling * factors.get(one, 0.0) * factors.get(other, 0.0)

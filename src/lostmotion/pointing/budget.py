@@ -11,11 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.validation import did_you_mean, shown
+from ..model.shaft_ratio import turns
 from ..response.spectrum import Spectrum, spectrum
 from ..simulation.runs.lost_steps import LostSteps, found_in
 from ..simulation.runs.pointing_error import pointed, pointing_errors, pointing_names

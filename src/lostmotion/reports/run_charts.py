@@ -13,6 +13,7 @@ from ..inputs.validation import shown
 from ..live_page.scenario_drawing import axis_figures
 from ..model.end_stops import END_STOP
 from ..model.losses import LossMap
+from ..model.shaft_ratio import tied
 from ..model.train import DriveTrain
 from ..simulation.runs.results import energy_of, scenario_of
 from ..simulation.runs.separate_trains import parts_of
@@ -199,22 +200,11 @@ def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
 
     Shafts that no gear joins to the last one are in terms of the last of their own, such as the slides of a mass matrix.
     """
+    joints = [(gear.input, gear.output, gear.ratio) for gear in train.fixed_gears().values()]
     ratios: dict[str, float] = {}
     for start in (last, *reversed(train.shafts)):
-        if start in ratios:
-            continue
-        ratios[start] = 1.0
-        waiting = [start]
-        while waiting:
-            shaft = waiting.pop()
-            for gear in train.fixed_gears().values():
-                for near, far, ratio in (
-                    (gear.output, gear.input, gear.ratio),
-                    (gear.input, gear.output, 1.0 / gear.ratio),
-                ):
-                    if near == shaft and far not in ratios:
-                        ratios[far] = ratio * ratios[near]
-                        waiting.append(far)
+        if start not in ratios:
+            ratios = tied({**ratios, start: 1.0}, joints)
     return {name: ratios[name] for name in train.shafts}
 
 

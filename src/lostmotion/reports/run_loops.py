@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..control.shaft_ratio import turns
 from ..errors import InputError
+from ..model.shaft_ratio import turns
 from ..servo.hunting.hunting_decision import moving_input, rises_of
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control.references import PositionReference, SlideReference
-from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time
 from ..inputs.validation import did_you_mean, shown
 from ..model.angle_torques import AngleCurve, Harmonic, PositionHarmonic
+from ..model.shaft_ratio import turns
 from ..model.train import DriveTrain
 from ..simulation.runs.pointing_error import pointed
 from ..simulation.runs.run import run

@@ -12,7 +12,7 @@ import numpy as np
 
 from .. import _core
 from ..control.loops import CurrentLoop, Feedforward, FieldOriented
-from ..control.shaft_ratio import turns
+from ..model.shaft_ratio import turns
 from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario

@@ -12,10 +12,10 @@ import numpy as np
 from .. import _core
 from ..control.axis import core_control
 from ..control.controller import Controller
-from ..control.shaft_ratio import turns
 from ..errors import InputError, need
 from ..inputs.validation import shown
 from ..model.gear import Gear
+from ..model.shaft_ratio import tied, turns
 from ..model.signals import ForceSignal, TorqueSignal, core_signal
 from ..model.torsion import Elastic, Rigid
 from ..response.linear import LinearModel, train_model
@@ -299,17 +299,8 @@ def speed_of(axis: Axis) -> float:
 def _speeds(axis: Axis, v: float, slip: float) -> dict[str, float]:
     """Speeds of all shafts that turn with the reference's shaft at speed v; across a gear with hysteresis they differ by `slip`."""
     train = axis.train
-    found, waiting = {axis.shaft: v}, [axis.shaft]
     joints = [
         (g.input, g.output, g.ratio * (1.0 + (0.0 if isinstance(g.stiffness, Rigid) else slip)))
         for g in train.fixed_gears().values()
     ]
-    joints += train.held_together()
-    while waiting:
-        here = waiting.pop()
-        for start, end, i in joints:
-            for a, b, factor in ((end, start, i), (start, end, 1.0 / i)):
-                if a == here and b not in found:
-                    found[b] = found[a] * factor
-                    waiting.append(b)
-    return found
+    return tied({axis.shaft: v}, joints + train.held_together())

@@ -9,12 +9,12 @@ import numpy as np
 from ..control.controller import Controller
 from ..control.filters import discrete
 from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurrent
-from ..control.shaft_ratio import turns
 from ..control.tuning import TwoInertias
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.losses import LossMap
+from ..model.shaft_ratio import turns
 from ..model.torsion import Rigid
 from .linear_regimes import Axis, speed_of
 

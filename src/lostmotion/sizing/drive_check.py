@@ -7,10 +7,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..control.shaft_ratio import turns
 from ..inputs.arguments import checked
 from ..model.linear import RatedScrew
 from ..model.losses import LossMap
+from ..model.shaft_ratio import turns
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
 from ..simulation.scenario.one_axis import OneAxis

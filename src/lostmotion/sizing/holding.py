@@ -7,9 +7,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from ..control.shaft_ratio import turns
 from ..inputs.named_elements import Named
 from ..model.motor import ShaftMotor
+from ..model.shaft_ratio import turns
 from ..model.signals import ForceSignal, Ramp, TorqueSignal
 from ..model.train import DriveTrain
 from ..simulation.forms.common_tables import SimulationTable

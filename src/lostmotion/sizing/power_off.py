@@ -7,7 +7,7 @@ import math
 import numpy as np
 
 from .. import _core
-from ..control.shaft_ratio import turns
+from ..model.shaft_ratio import turns
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from ..test_rig.virtual_rig import TestRig

@@ -10,12 +10,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control.command import CommandSignal, Stepping
-from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.named_elements import Named
 from ..inputs.validation import did_you_mean, shown
 from ..model.motor import ShaftMotor
+from ..model.shaft_ratio import turns
 from ..model.signals import TorqueSignal
 from ..model.stepper import ELECTRIC, pull_out_torque
 from ..simulation.forms.initial_state import angles_at_start

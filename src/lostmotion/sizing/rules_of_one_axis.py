@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..control.shaft_ratio import turns
 from ..model.gears_in_series import DIRECT
+from ..model.shaft_ratio import turns
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.stuck_contacts import smallest_commands
 from ..simulation.scenario.one_axis import OneAxis, tied_together

@@ -8,10 +8,10 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ..control.references import MovesReference
-from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number
+from ..model.shaft_ratio import turns
 from ..model.torsion import Rigid
 from ..simulation.runs.lost_steps import LostSteps, found_in
 from ..simulation.runs.pointing_error import pointed, pointing_errors, pointing_names

@@ -13,8 +13,8 @@ from typing import Any
 
 import numpy as np
 
-from ...control.shaft_ratio import turns
 from ...errors import InputError
+from ...model.shaft_ratio import turns
 from ...model.torsion import Rigid
 from ..prepared_log import Prepared, Segment
 from ..rig.measured_motion import depends_on_angle

@@ -16,11 +16,11 @@ from typing import Any
 import numpy as np
 from scipy.signal import savgol_filter
 
-from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...model.angle_torques import STANDARD_GRAVITY, Gravity, PositionHarmonic, TorqueHarmonic
 from ...model.losses import ConstantEfficiency, MeshEfficiency
 from ...model.motor import ShaftMotor
+from ...model.shaft_ratio import turns
 from ...simulation.scenario.scenario import Scenario
 from ..prepared_log import Prepared
 from .log_inputs import DELAY, course_of_input, numbers_of_input

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from ...control.shaft_ratio import turns
 from ...errors import InputError
+from ...model.shaft_ratio import turns
 from ...model.train import DriveTrain
 from ..prepared_log import Prepared, Segment
 from ..task.file_formulas import names_in

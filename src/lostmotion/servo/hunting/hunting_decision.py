@@ -17,7 +17,7 @@ from typing import Literal
 
 import numpy as np
 
-from ...control.shaft_ratio import turns
+from ...model.shaft_ratio import turns
 from ...response.closed_loop import running_slots
 from ...response.closed_response import frame_of
 from ...simulation.runs.stuck_contacts import explain

@@ -15,7 +15,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ...control.shaft_ratio import turns
+from ...model.shaft_ratio import turns
 from ...units.practical import counted
 from ..linear_regimes import Axis
 from .exact_slips import Slips

@@ -18,8 +18,8 @@ import numpy as np
 from ... import _core
 from ...control.controller import Controller
 from ...control.loops import FirstOrderCurrent, IdealCurrent
-from ...control.shaft_ratio import turns
 from ...errors import InputError
+from ...model.shaft_ratio import turns
 from ...response.linear import LinearModel
 from ...simulation.forms.initial_state import start_values
 from ...simulation.forms.train_tables import TrainInitial

@@ -17,8 +17,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ... import _core
-from ...control.shaft_ratio import turns
 from ...errors import InputError
+from ...model.shaft_ratio import turns
 from ...model.signals import core_signal
 from ...model.torsion import Rigid
 from ...response.linear import LinearModel, train_model

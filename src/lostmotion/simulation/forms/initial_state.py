@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from ... import _core
 from ...errors import InputError
 from ...inputs.validation import did_you_mean
+from ...model.shaft_ratio import tied
 from ...model.signals import Signal
 from ...model.torsion import Rigid
 from ...model.train import DriveTrain
@@ -63,11 +64,11 @@ def start_values(
 def _refuse_contradiction(train: DriveTrain, given: Mapping[str, float]) -> None:
     """Refuses two given speeds where one follows from the other through rigid parts between them."""
     for one, speed in given.items():
-        tied = tied_speeds(train, {one: speed})
-        for other in (name for name in given if name in tied and name != one):
-            if agree(given[other], tied[other]):
+        there = tied_speeds(train, {one: speed})
+        for other in (name for name in given if name in there and name != one):
+            if agree(given[other], there[other]):
                 continue
-            a, wanted = (f"{x:.10g} {_speed_unit(train, other)}" for x in (given[other], tied[other]))
+            a, wanted = (f"{x:.10g} {_speed_unit(train, other)}" for x in (given[other], there[other]))
             b = f"{speed:.10g} {_speed_unit(train, one)}"
             key = "slide_speeds" if train.is_slide(other) else "speeds"
             raise InputError(
@@ -167,22 +168,10 @@ def given_speeds(train: DriveTrain, motions: Mapping[str, tuple[Signal[Any], Sig
 def tied_speeds(train: DriveTrain, given: Mapping[str, float]) -> dict[str, float]:
     """Speeds [rad/s, m/s] that are given, and the speeds of other shafts and slides that rigid gears tie to them."""
     gears = train.fixed_gears().values()
-    tied = [g for g in gears if isinstance(g.stiffness, Rigid) and not g.stiffness.strikes]
-    rigid = [(g.input, g.output, g.ratio) for g in tied]
-    speeds = {name: speed for name, speed in given.items() if not may_be_left_out(speed)}
-    left, waiting = {name: speed for name, speed in given.items() if name not in speeds}, list(speeds)
-    while waiting or left:
-        if not waiting:
-            shaft = next(iter(left))
-            speed = left.pop(shaft)
-            if shaft not in speeds:
-                speeds[shaft] = speed
-                waiting.append(shaft)
-            continue
-        shaft = waiting.pop()
-        for one, other, ratio in rigid:
-            found = {one: (other, 1.0 / ratio), other: (one, ratio)}.get(shaft)
-            if found is not None and found[0] not in speeds:
-                speeds[found[0]] = speeds[shaft] * found[1]
-                waiting.append(found[0])
+    rigid = [g for g in gears if isinstance(g.stiffness, Rigid) and not g.stiffness.strikes]
+    joints = [(g.input, g.output, g.ratio) for g in rigid]
+    speeds = tied({name: speed for name, speed in given.items() if not may_be_left_out(speed)}, joints)
+    for name, speed in given.items():
+        if name not in speeds:
+            speeds = tied({**speeds, name: speed}, joints)
     return speeds

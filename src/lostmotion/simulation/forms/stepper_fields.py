@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from ...control.command import CommandSignal, CurrentLevel, FieldAngle, Stepping
-from ...control.shaft_ratio import turns
 from ...inputs.quantities import Number
 from ...inputs.validation import did_you_mean, shown
+from ...model.shaft_ratio import turns
 from ...model.signals import Signal
 from .initial_state import angles_at_start
 

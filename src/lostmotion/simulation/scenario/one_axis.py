@@ -4,10 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from ...control.shaft_ratio import turns
 from ...model.gear import Gear
 from ...model.gearbox import Gearbox
 from ...model.gears_in_series import DIRECT, in_series
+from ...model.shaft_ratio import turns
 from ...model.torsion import Rigid
 from ...model.train import DriveTrain
 from .scenario import Scenario

@@ -15,7 +15,6 @@ from ...control.axis import NO_LAWS, BoundController, core_control, motor_laws
 from ...control.continuous import ContinuousController
 from ...control.controller import Controller
 from ...control.custom_controller import Law
-from ...control.shaft_ratio import turns
 from ...data_sheets.components import use_records
 from ...data_sheets.train_components import use_train_records
 from ...errors import InputError
@@ -28,6 +27,7 @@ from ...model.gear import Gear
 from ...model.gearbox import Gearbox
 from ...model.linear_train import LinearElements
 from ...model.motor import Motor
+from ...model.shaft_ratio import turns
 from ...model.signals import Signal
 from ...model.train import DriveTrain
 from ...recorded_numbers import may_differ

@@ -10,10 +10,10 @@ from typing import Any
 import numpy as np
 
 from ... import _core
-from ...control.shaft_ratio import turns
 from ...errors import InputError
 from ...inputs.validation import listed
 from ...model.drive import Drive
+from ...model.shaft_ratio import turns
 from ...model.torsion import Elastic
 from ...model.train import DriveTrain
 from ..forms.train_tables import TrainInitial

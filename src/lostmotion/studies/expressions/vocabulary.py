@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import NamedTuple
 
-from ...control.shaft_ratio import turns
+from ...model.shaft_ratio import turns
 from ...simulation.runs.pointing_error import pointing_names
 from ...simulation.scenario.field_oriented_motors import bound_names
 from ...simulation.scenario.scenario import Scenario

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
-from ...control.shaft_ratio import turns
+from ...model.shaft_ratio import turns
 from ...response.crossovers import bandwidth
 from ...simulation.scenario.scenario import Scenario
 from ...worker_threads import thread_pool
