@@ -32,7 +32,7 @@ NAMES_A_FORM = re.compile(
     r"\[shafts\]|\[axis\]|short form|long form|is a (drive )?train|are for (drives|trains)|must be a Drive|give an Initial|takes a (drive|train)|is no (drive|train)",
     re.I,
 )
-HINGE = '<mujoco><worldbody><body><joint name="j" axis="0 0 1"/><geom type="box" size=".1 .2 .3" mass="1"/></body></worldbody></mujoco>'
+JOINT = '<mujoco><worldbody><body><joint name="j" type="{}" axis="0 0 1"/><geom type="box" size=".1 .2 .3" mass="1"/></body></worldbody></mujoco>'
 
 
 def inertias(scenario: lm.Scenario) -> Iterator[str]:
@@ -114,7 +114,7 @@ def measure_once(gear: lm.Gear) -> None:
 
 
 def attached(scenario: lm.Scenario, path: Path) -> None:
-    (path / "model.xml").write_text(HINGE)
+    (path / "model.xml").write_text(JOINT.format("slide" if scenario.slides else "hinge"))
     lm.mujoco.attach(path / "model.xml", {"j": scenario}, replace=True)
 
 
@@ -146,13 +146,14 @@ FUNCTIONS: dict[str, Callable[[lm.Scenario, Path], Any]] = {
     "export_fmu": exported,
     "live": lambda s, _: describe(s, "x"),
     "measure": measured,
+    "stepper_curves": lambda s, _: lm.sizing.stepper_curves(s, [2000.0]),
     "pointing_budget": lambda s, _: lm.pointing_budget(s, after=0.0, robustness=False),
 }
 
 
 QUICK = {name: FUNCTIONS[name] for name in FUNCTIONS.keys() - {"commission", "live", "export_fmu", "monitor"}}
 """those that take less than some seconds; pages, FMUs and servo sheets of shipped scenarios are tested by themselves"""
-QUICKEST = {name: QUICK[name] for name in QUICK.keys() - {"limit_cycle", "sensitivities"}}
+QUICKEST = {name: QUICK[name] for name in QUICK.keys() - {"limit_cycle", "sensitivities", "stepper_curves"}}
 """those that take no long runs to rest, nor derivatives through many switchings"""
 
 

@@ -322,6 +322,20 @@ def test_a_train_of_two_stages_is_described_by_what_all_its_parts_are_at_the_joi
     assert found.frictionloss == pytest.approx(10.0 * 0.05, rel=1e-2)
 
 
+def test_a_screw_axis_is_described_by_mass_and_forces_at_its_slide() -> None:
+    """Ratio 2 pi/lead; armature: its square times the rotor; friction: that of the motor times the ratio, and that of the guide."""
+    ratio = 2.0 * np.pi / 0.01
+    screw = {"s": {"input": "motor", "output": "table", "lead": 0.01}}
+    found = lm.mujoco.reduce(lm.Scenario(**SCREW | {"screws": screw}), "100 mm", 1.0)
+    assert found.gear == pytest.approx(ratio, rel=1e-3)
+    assert found.armature == pytest.approx(2e-4 * ratio**2, rel=1e-2)
+    assert found.frictionloss == pytest.approx(0.05 * ratio + 20.0, rel=1e-2)
+    assert '<joint name="table" type="slide" armature' in found.mjcf("table")
+    assert 'type="prismatic"' in found.urdf("table")
+    with pytest.raises(lm.InputError, match="amplitude"):
+        lm.mujoco.reduce(lm.Scenario(**SCREW), "10 deg", 1.0)
+
+
 def test_the_load_torque_of_a_scenario_is_not_dropped_from_a_reduction() -> None:
     joint = lm.load("catalogue-robot-joint")
     with pytest.raises(lm.InputError) as caught:

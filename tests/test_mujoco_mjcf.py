@@ -62,6 +62,11 @@ def exactly(made: Any, control: float, begin: float = 0.0, **options: Any) -> fl
 # A second order scheme at 1 ms against gravity, which turns with the arm, has an error of about 1e-7 rad in 0.3 s.
 ACCURACY = 1e-6
 
+
+def slide(joint: Any, _actuator: Any, stiffness: float = 0.0) -> None:
+    joint.type, joint.stiffness[0] = mujoco.mjtJoint.mjJNT_SLIDE, stiffness
+
+
 SERVOS: dict[str, tuple[str, Callable[[Any, Any], None], float]] = {
     "position": ("position", lambda _j, a: None, 0.7),
     "damping ratio": ("position", lambda _j, a: a.set_to_position(kp=30.0, dampratio=0.4), 0.7),
@@ -72,6 +77,11 @@ SERVOS: dict[str, tuple[str, Callable[[Any, Any], None], float]] = {
     "velocity, gear": ("velocity", lambda _j, a: a.gear.__setitem__(0, -2.0), 1.2),
     "motor": ("motor", lambda _j, a: None, 0.2),
     "motor, gain": ("motor", lambda _j, a: a.gainprm.__setitem__(0, -3.0), 0.2),
+    "slide": ("position", slide, 0.7),
+    "slide, velocity": ("velocity", slide, 1.2),
+    "slide, motor": ("motor", slide, 0.2),
+    "slide, spring": ("motor", lambda j, a: slide(j, a, 40.0), 0.2),
+    "slide, servo and spring": ("position", lambda j, a: slide(j, a, 40.0), 0.7),
 }
 
 

@@ -186,6 +186,51 @@ def test_a_joint_that_begins_away_from_0_swings_on_the_spring_of_its_train(tmp_p
         assert data.qpos[0] - 0.5 * np.cos(0.4 * w) == pytest.approx(ahead, rel=0.02)
 
 
+def travelled(kind: str, drive: lm.Scenario, where: Path, step: float) -> float:
+    """Where the plugin brings a joint of 80 kg or 80 kg m2 without weight in 0.2 s."""
+    file, armature = where / "table", 2e-4 * (2.0 * np.pi / 0.01) ** 2
+    lm.mujoco.write_drive(drive, file)
+    body = (
+        f'<joint name="table" type="{kind}" axis="0 0 1" armature="{armature!r}"/><inertial pos="0 0 0" mass="80" diaginertia="80 80 80"/>'
+    )
+    model = mujoco.MjModel.from_xml_string(
+        f'<mujoco><option timestep="{step}" gravity="0 0 0"/><extension><plugin plugin="lostmotion.drive"/></extension>'
+        f'<worldbody><body>{body}</body></worldbody><actuator><plugin joint="table" plugin="lostmotion.drive">'
+        f'<config key="scenario" value="{file}"/></plugin></actuator></mujoco>'
+    )
+    data = mujoco.MjData(model)
+    for k in range(round(0.2 / step)):
+        data.ctrl[:] = 2.0 + 0.5 * np.sin(30.0 * (k + 0.5) * step)
+        mujoco.mj_step(model, data)
+    return float(data.qpos[0])
+
+
+def test_a_slide_moves_as_a_hinge_of_the_same_numbers_and_as_attach_to_first_order(tmp_path: Path) -> None:
+    motor = {"kind": "torque_source", "rotor_inertia": 2e-4, "friction_torque": 0.05}
+    given = {"motors": {"m": {"shaft": "motor", **motor}}, "command": {"m": {}}, "simulation": {"duration": 1.0, "sample_interval": 1e-3}}
+    screw = lm.Scenario(
+        shafts={"motor": {}},
+        slides={"table": {"mass": 30.0, "friction_force": 20.0}},
+        screws={"s": {"input": "motor", "output": "table", "lead": 0.01, "stiffness": 8e6}},
+        **given,
+    )
+    gear = {"input": "motor", "output": "table", "ratio": 2.0 * np.pi / 0.01, "stiffness": {"kind": "linear", "stiffness": 8e6}}
+    table = {"inertia": 30.0, "friction_torque": 20.0}
+    hinge = lm.Scenario(shafts={"motor": {}, "table": table}, gears={"s": gear}, **given)
+    body = '<joint name="table" type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="80" diaginertia="1 1 1"/>'
+    text = f'<mujoco><option timestep="0.00025" gravity="0 0 0"/><worldbody><body>{body}</body></worldbody></mujoco>'
+    exact = lm.mujoco.attach(mujoco.MjModel.from_xml_string(text), {"table": screw})
+    for k in range(800):
+        exact.step([2.0 + 0.5 * np.sin(30.0 * (k + 0.5) * 2.5e-4)])
+    ends = [travelled("slide", screw, tmp_path, step) for step in (2e-3, 1e-3)]
+    assert ends == [travelled("hinge", hinge, tmp_path, step) for step in (2e-3, 1e-3)]
+    errors = [end - exact.data.qpos[0] for end in ends]
+    assert errors[0] / errors[1] == pytest.approx(2.0, rel=0.05)
+    assert abs(errors[1]) < 0.01 * exact.data.qpos[0]
+    with pytest.raises((mujoco.FatalError, ValueError), match="the joint is a hinge, and the train ends at a slide"):
+        travelled("hinge", screw, tmp_path, 1e-3)
+
+
 def test_a_motor_without_a_gear_turns_a_joint_by_its_torque(tmp_path: Path) -> None:
     motor = {"shaft": "joint", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.02}
     model = hinge({"shafts": {"joint": {}}, "motors": {"m": motor}}, tmp_path, 1e-3)

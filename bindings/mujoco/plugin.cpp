@@ -1,4 +1,4 @@
-// An actuator plugin of MuJoCo: a drive train that turns a hinge. It loads into the stock library by
+// An actuator plugin of MuJoCo: a drive train that moves a hinge or a slide. It loads into the stock library by
 // mj_loadPluginLibrary.
 //
 // The joint needs the inertia A that the drive has at the joint through closed meshes as its armature, since a plugin
@@ -23,6 +23,7 @@
 #include <string>
 #include <vector>
 
+#include "lostmotion/model/names.hpp"
 #include "lostmotion/scenario/description.hpp"
 #include "lostmotion/scenario/simulation.hpp"
 #include "lostmotion/simulation/joint_trains.hpp"
@@ -154,13 +155,18 @@ int init(const mjModel* m, mjData* d, int instance) {
         }
     if (count != 1) fail(m, instance, "must be the plugin of one actuator, and is that of " + std::to_string(count));
     const int joint = m->actuator_trnid[2 * actuator];
-    if (m->actuator_trntype[actuator] != mjTRN_JOINT || m->jnt_type[joint] != mjJNT_HINGE)
-        fail(m, instance, "must turn a hinge; give joint");
+    const bool slide = m->jnt_type[joint] == mjJNT_SLIDE;
+    if (m->actuator_trntype[actuator] != mjTRN_JOINT || (m->jnt_type[joint] != mjJNT_HINGE && !slide))
+        fail(m, instance, "must move a hinge or a slide; give joint");
     const int control = m->actuator_ctrladr[actuator], output = m->actuator_outadr[actuator];
     if (m->actuator_gear[6 * output] != 1.0) fail(m, instance, "the actuator has a gear; the drive has its own");
     refuse_limits(m, instance, actuator, joint);
     if (m->opt.integrator == mjINT_RK4) fail(m, instance, "needs another integrator than RK4");
     DriveFile file = file_of(m, instance);
+    if (lm::model::is_slide(file.scenario.train, static_cast<int>(file.joint)) != slide)
+        fail(m, instance,
+             slide ? "the joint is a slide, and the train ends at a shaft that turns; it needs a slide there"
+                   : "the joint is a hinge, and the train ends at a slide; it needs a shaft that turns");
     const int dof = m->jnt_dofadr[joint];
     const double given = m->dof_armature[dof];
     if (!(std::fabs(given - file.armature) <= 1e-3 * file.armature)) {
@@ -169,7 +175,8 @@ int init(const mjModel* m, mjData* d, int instance) {
                       given, file.armature);
         fail(m, instance, line);
     }
-    const double whole = 1.0 / m->dof_invweight0[dof];
+    // The engine counts the armature in, but for a body that slides alone.
+    const double whole = 1.0 / m->dof_invweight0[dof] + (m->body_simple[m->dof_bodyid[dof]] == 2 ? given : 0.0);
     file.scenario.train.shafts[file.joint].inertia = whole - given;
     auto made = std::make_unique<Drive>(file, m->opt.timestep);
     made->control = control;

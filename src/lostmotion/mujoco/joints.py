@@ -59,12 +59,6 @@ def is_slide(model: mujoco.MjModel, joint: int) -> bool:
     return bool(model.jnt_type[joint] == int(mujoco.mjtJoint.mjJNT_SLIDE))
 
 
-def refuse_slide(model: mujoco.MjModel, name: str, who: str) -> None:
-    """Refuse a joint that moves along a line, for what takes hinges alone."""
-    if is_slide(model, joint_id(model, name)):
-        raise InputError(f"joint {name!r}: is a slide, and {who} is for hinges; lm.mujoco.attach takes slides")
-
-
 def actuators_of(model: mujoco.MjModel, joint: int) -> list[int]:
     """Numbers of the actuators on a joint, or on a tendon of this joint alone."""
     import mujoco

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.continuous import ContinuousController
 from ..errors import InputError, need
 from ..inputs.arguments import checked
+from ..inputs.named_elements import Named
 from ..inputs.quantities import Number
 from ..model.drive import Drive
 from ..model.gearbox import Gearbox
@@ -20,9 +22,10 @@ from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
 from ..model.springs import Spring
 from ..model.torsion import LinearStiffness, Rigid
+from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import Driven
-from .joints import acts, actuator_name, actuators_of, compiled, joint_id, refuse_slide
+from .joints import acts, actuator_name, actuators_of, compiled, is_slide, joint_id
 
 if TYPE_CHECKING:
     import mujoco
@@ -73,7 +76,7 @@ class _Law:
 @checked
 def from_mjcf(
     model: mujoco.MjSpec | mujoco.MjModel, joint: str, *, ratio: Number | None = None
-) -> Drive | JointActuator:
+) -> Drive | DriveTrain | JointActuator:
     """Return the drive that a joint of a MuJoCo model describes: a rigid gear without losses, its friction on the load.
 
     Parameters
@@ -81,16 +84,16 @@ def from_mjcf(
     model
         With the joint and perhaps an actuator on it: a motor, or a servo of the position or the speed.
     joint
-        Name of the hinge. Its armature is the rotor's inertia at the joint, damping and frictionloss act on the load.
+        Name of the hinge or slide. Its armature is the rotor's inertia at the joint, damping and frictionloss act on the load.
     ratio
-        Of the gear; left out, the gear of the actuator of the joint.
+        Of the gear, for a slide in rad/m; left out, the gear of the actuator of the joint.
 
     Returns
     -------
-    Drive or JointActuator
-        A drive, whose command is the torque on the motor's shaft, if the control of the actuator is that. Otherwise the drive,
-        with its controller if the actuator is a servo, and the scale and limits of its control. The load has 1 kg·m²,
-        which `attach` replaces.
+    Drive, DriveTrain or JointActuator
+        A drive, for a slide or with a spring a train, whose command is the torque on the motor's shaft, if the control of the actuator is
+        that. Otherwise the drive, with its controller if the actuator is a servo, and the scale and limits of its control. The load has
+        1 kg·m² or 1 kg, which `attach` replaces.
 
     Raises
     ------
@@ -116,7 +119,6 @@ def from_mjcf(
     need("mujoco", "lostmotion.mujoco", "mujoco")
 
     model = compiled(model)
-    refuse_slide(model, joint, "from_mjcf")
     number = joint_id(model, joint)
     dof = model.jnt_dofadr[number]
     actuators = actuators_of(model, number)
@@ -157,15 +159,20 @@ def from_mjcf(
             friction_torque=float(model.dof_frictionloss[dof]) if acts(model, "FRICTIONLOSS") else 0.0,
         ),
     )
-    springs = _springs(model, number)
+    springs, slides = _springs(model, number), is_slide(model, number)
+    train = drive.train().model_copy(update={"springs": springs})
+    if slides:
+        load = train.shafts["load"].model_copy(update={"domain": "translation"})
+        train = train.model_copy(update={"shafts": Named({**train.shafts, "load": load})})
     if servo:
-        return _servo(joint, drive, springs, law)
-    made = _motor(joint, drive.train().model_copy(update={"springs": springs}) if springs else drive, law, ratio)
-    return drive if made == JointActuator(drive) else made
+        return _servo(joint, train, law)
+    given = train if springs or slides else drive
+    made = _motor(joint, given, law, ratio)
+    return given if made == JointActuator(given) else made
 
 
 def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
-    """The law of an actuator on a hinge.
+    """The law of an actuator on a joint.
 
     Raises InputError: it has another one, or an attribute that is not taken over.
     """
@@ -243,12 +250,12 @@ def _refuse_of_joint(model: mujoco.MjModel, joint: str, number: int) -> None:
             raise InputError(f"{what}is not taken over; take it off the joint", key, where=f"joint {joint!r}")
 
 
-def _springs(model: mujoco.MjModel, number: int) -> dict[str, Spring]:
+def _springs(model: mujoco.MjModel, number: int) -> Named[Spring]:
     stiffness = float(model.jnt_stiffness[number]) if acts(model, "SPRING") else 0.0
     rest = float(model.qpos_spring[model.jnt_qposadr[number]])
     if stiffness == 0.0:
-        return {}
-    return {"joint": Spring(shaft="load", stiffness=LinearStiffness(stiffness=stiffness), rest_angle=rest)}
+        return Named({})
+    return Named({"joint": Spring(shaft="load", stiffness=LinearStiffness(stiffness=stiffness), rest_angle=rest)})
 
 
 def _motor(joint: str, drive: Driven, law: _Law, ratio: float) -> JointActuator:
@@ -259,7 +266,7 @@ def _motor(joint: str, drive: Driven, law: _Law, ratio: float) -> JointActuator:
     return JointActuator(drive, law.gain * law.gear / ratio, lower, upper)
 
 
-def _servo(joint: str, drive: Drive, springs: dict[str, Spring], law: _Law) -> JointActuator:
+def _servo(joint: str, train: DriveTrain, law: _Law) -> JointActuator:
     """A servo: ``k_p (r - phi) - k_d w`` of the angle, or ``k_p (r - w)`` of the speed, within a limit."""
     low, high = law.force
     if low != -high or high == 0.0:
@@ -269,26 +276,17 @@ def _servo(joint: str, drive: Drive, springs: dict[str, Spring], law: _Law) -> J
             "actuatorfrcrange",
             where=f"joint {joint!r}",
         )
-    per_joint = law.gear * law.gear / drive.gearbox.ratio
+    ratio = train.gears["gearbox"].ratio
+    per_joint = law.gear * law.gear / ratio
     of_angle, of_speed = (-bias * per_joint for bias in law.bias)
     position = of_angle > 0.0
-    controller = {
-        "kind": "continuous",
-        "shaft": "load",
-        "reference": {"kind": "position" if position else "speed"},
-        **(
-            {"position": {"gain": of_angle, "derivative_gain": of_speed}} if position else {"speed": {"gain": of_speed}}
-        ),
-        **({} if math.isinf(high) else {"limit": high * abs(law.gear) / drive.gearbox.ratio}),
-    }
-    train = drive.train()
-    scenario = Scenario(
-        shafts={name: shaft.model_dump(exclude_unset=True) for name, shaft in train.shafts.items()},
-        motors=dict(train.motors),
-        gears=dict(train.gears),
-        springs=springs,
-        controllers={"motor": controller},
-        simulation={"duration": 1.0, "sample_interval": 1e-3},
+    loop = {"position": {"gain": of_angle, "derivative_gain": of_speed}} if position else {"speed": {"gain": of_speed}}
+    controller = ContinuousController(
+        kind="continuous",
+        shaft="load",
+        reference={"kind": "position" if position else "speed"},
+        limit=None if math.isinf(high) else high * abs(law.gear) / ratio,
+        **loop,
     )
     scale = law.gain / (-law.bias[0 if position else 1] * law.gear)
-    return JointActuator(scenario, scale, *law.control)
+    return JointActuator(Scenario.of_any(train).with_axes({"motor": controller}), scale, *law.control)

@@ -16,7 +16,7 @@ from ..portable.checkout import made_here
 from ..portable.derivation import Derivation
 from ..portable.descriptions import written
 from ..simulation.forms.train_tables import TrainInitial
-from ..simulation.stepping.robot_joints import joint_drive
+from ..simulation.stepping.robot_joints import joint_drive, output_of
 from ..simulation.stepping.solver_access import solver_train
 from .attaching import drive_of_joint
 from .overlaps import without_weight
@@ -94,7 +94,8 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     name = Path(path).stem
     given = drive_of_joint(name, drive, controller)
     given = without_weight(name, given, replace=replace, weighs=True)
-    joint = joint_drive(name, given, 1.0, 1e-3)
+    train = given.train()
+    joint = joint_drive(name, given, 1.0, 1e-3, slides=train.is_slide(output_of(name, train)))
     core = solver_train(joint.simulation)
     still = [CommandSignal().core()] * len(core.input_names())
     start = joint.drive.start(TrainInitial(speeds=joint.ratios()))

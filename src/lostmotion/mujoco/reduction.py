@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.named_elements import Named
-from ..inputs.quantities import Angle, Frequency, Torque
+from ..inputs.quantities import Frequency, argument
 from ..inputs.validation import shown
 from ..model.drive import Drive
 from ..model.motor import ShaftMotor
@@ -28,17 +28,19 @@ class Reduction:
     """Best description of a drive in MuJoCo for one motion."""
 
     armature: float
-    """inertia of the drive at the joint [kg·m²]"""
+    """inertia of the drive at the joint [kg·m²], at a slide its mass [kg]"""
     damping: float
-    """[N·m·s/rad]"""
+    """[N·m·s/rad], at a slide [N·s/m]"""
     frictionloss: float
-    """[N·m]"""
+    """[N·m] or [N]"""
     gear: float
-    """torque on the joint over torque of the motor"""
+    """torque or force on the joint over torque of the motor"""
     torque_error: float
-    """root mean square [N·m] of what this leaves of the torque on the joint"""
+    """root mean square [N·m] or [N] of what this leaves of the torque or force on the joint"""
     torque: float
-    """root mean square of the torque on the joint [N·m]"""
+    """root mean square of the torque [N·m] or force [N] on the joint"""
+    slides: bool = False
+    """whether the joint is a slide"""
 
     @property
     def error(self) -> float:
@@ -47,23 +49,25 @@ class Reduction:
 
     def mjcf(self, joint: str) -> str:
         """The joint and its motor as MJCF."""
+        kind = ' type="slide"' if self.slides else ""
         return (
-            f'<joint name="{joint}" armature="{self.armature:.6g}" damping="{self.damping:.6g}" frictionloss="{self.frictionloss:.6g}"/>\n'
+            f'<joint name="{joint}"{kind} armature="{self.armature:.6g}" damping="{self.damping:.6g}" frictionloss="{self.frictionloss:.6g}"/>\n'
             f'<motor name="{joint}" joint="{joint}" gear="{self.gear:.6g}"/>'
         )
 
     def urdf(self, joint: str) -> str:
         """The joint as URDF, whose dynamics has no armature: it is a comment there."""
+        kind, unit = ("prismatic", "kg") if self.slides else ("revolute", "kg m2")
         return (
-            f'<joint name="{joint}" type="revolute">\n'
-            f'  <dynamics damping="{self.damping:.6g}" friction="{self.frictionloss:.6g}"/>  <!-- armature {self.armature:.6g} kg m2, gear {self.gear:.6g} -->\n'
+            f'<joint name="{joint}" type="{kind}">\n'
+            f'  <dynamics damping="{self.damping:.6g}" friction="{self.frictionloss:.6g}"/>  <!-- armature {self.armature:.6g} {unit}, gear {self.gear:.6g} -->\n'
             "</joint>"
         )
 
 
 @checked
 def reduce(
-    drive: Drive | DriveTrain | Scenario, amplitude: Angle, frequency: Frequency, load_torque: Torque = 0.0
+    drive: Drive | DriveTrain | Scenario, amplitude: float, frequency: Frequency, load_torque: float = 0.0
 ) -> Reduction:
     """Describe a drive by armature, damping, friction loss and gear, best for one motion.
 
@@ -76,11 +80,11 @@ def reduce(
     drive
         With the inertia of its load, and one motor of any kind, which is taken as a torque source.
     amplitude
-        Of the joint [rad].
+        Of the joint [rad], of a slide [m].
     frequency
         [Hz]
     load_torque
-        Constant torque against the joint [N·m], such as gravity. The efficiency of the gear acts on it.
+        Constant torque [N·m] or force [N] against the joint, such as gravity. The efficiency of the gear acts on it.
 
     Returns
     -------
@@ -102,13 +106,17 @@ def reduce(
     <joint name="elbow" armature="0.45..." damping="3.17..." frictionloss="11.6..."/>
     <motor name="elbow" joint="elbow" gear="100"/>
     """
+    scenario = Scenario.of_any(drive)
+    train = scenario.tables.train()
+    joint = output_of("joint", train)
+    amplitude = argument("amplitude", amplitude, train.angle_unit(joint))
+    load_torque = argument("load_torque", load_torque, train.torque_unit(joint))
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
             raise InputError(f"{name}: {shown(value)} must be positive")
-    scenario = Scenario.of_any(drive)
     if load_torque == 0.0 and (loads := loads_of(scenario) + weights_of("joint", scenario)):
         raise InputError("is not taken over; give load_torque, or leave the key out", *loads)
-    source = _torque_source(without_weight("joint", scenario, replace=True, weighs=True).long().train())
+    source = _torque_source(without_weight("joint", scenario, replace=True, weighs=True).tables.train())
     columns, target, ratio = _along_sines(source, amplitude, frequency, load_torque)
     if load_torque == 0.0:
         # Without a load torque only the product of gear and motor torque counts: the gear is its ratio.
@@ -119,7 +127,7 @@ def reduce(
     left = target - columns @ values
     gear, armature, damping, loss = map(float, values)
     rms = [float(np.sqrt(np.mean(x * x))) for x in (left, target)]
-    return Reduction(armature, damping, loss, gear, *rms)
+    return Reduction(armature, damping, loss, gear, *rms, slides=train.is_slide(joint))
 
 
 def _torque_source(train: DriveTrain) -> DriveTrain:
@@ -144,7 +152,7 @@ def _along_sines(
     step = 1.0 / (STEPS_PER_PERIOD * frequency)
     joint = output_of("joint", train)
     inertia = train.inertia_of(joint)
-    made = joint_drive("joint", train, inertia, step)
+    made = joint_drive("joint", train, inertia, step, slides=train.is_slide(joint))
     simulation, ratios = made.simulation, made.ratios()
     ((name, motor),) = train.motors.items()
     ratio, command, load = ratios[motor.shaft], train.variable(name, "command"), train.variable(joint, "load_torque")

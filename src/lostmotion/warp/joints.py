@@ -12,8 +12,12 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.validation import listed, shown
 from ..mujoco.attaching import alone_on_joint
-from ..mujoco.joints import compiled, mass_matrix, refuse_slide
+<<<<<<< HEAD
+from ..mujoco.joints import compiled, is_slide, joint_id, mass_matrix
 from ..simulation.batches.batch_parameters import mask_of_drives
+=======
+from ..mujoco.joints import compiled, is_slide, joint_id, mass_matrix
+>>>>>>> 0be6c54a (Slides are joints of reductions, of drives from MJCF and of the MuJoCo plugin)
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives
 
@@ -269,7 +273,11 @@ def attach(
     gains = _gains(drives, stiffness, damping)
     made = {}
     for name, given in drives.items():
-        refuse_slide(robot, name, "lm.warp.attach")
+        if is_slide(robot, joint_id(robot, name)):
+            raise InputError(
+                f"joint {name!r}: is a slide, and the drives on a GPU have one motor, one gearbox and a load that turns; "
+                "lm.mujoco.attach takes slides"
+            )
         scenario = alone_on_joint(robot, name, given, None, replace=False)
         kinds = {motor.kind for motor in scenario.train().motors.values()}
         if name in gains and kinds != {"torque_source"}:

@@ -39,11 +39,6 @@ def check_train(scenario: Whole) -> None:
 def _check_shafts(tables: TrainTables) -> None:
     if not tables.shafts and not tables.slides:
         raise InputError("there is neither a shaft nor a slide; add [shafts.NAME] or [slides.NAME]", "shafts")
-    for name, shaft in tables.shafts.items():
-        if shaft.domain != "rotation":
-            raise InputError(
-                f"is translation; write the slide as [slides.{name}], with its mass", f"shafts.{name}.domain"
-            )
     tables.check_places(tables.shafts, tables.slides)
     for name, mass in tables.mass_matrices.items():
         for slide in mass.shafts:

@@ -12,7 +12,7 @@ from pydantic import ConfigDict, Field, model_validator
 from ... import _core
 from ...control.command import CommandSignal
 from ...control.continuous import ContinuousController
-from ...control.controller import AnyController, Controller
+from ...control.controller import AnyController
 from ...control.references import PositionReference, SlideReference
 from ...data_sheets.train_components import CONDITIONS, RECORDS
 from ...errors import inside
@@ -223,8 +223,8 @@ class TrainTables(ScenarioTables, LinearElements):
             return {"slides": {**self.slides, shaft: self.slides[shaft].model_copy(update={"mass": inertia})}}
         return {"shafts": {**self.shafts, shaft: self.shafts[shaft].model_copy(update={"inertia": inertia})}}
 
-    def of_axes(self, axes: Mapping[str, Controller]) -> dict[str, Any]:
-        """The tables that change with other sampled controllers, by the names of their motors."""
+    def of_axes(self, axes: Mapping[str, AnyController]) -> dict[str, Any]:
+        """The tables that change with other controllers, by the names of their motors."""
         command = {name: signal for name, signal in self.command.items() if name not in axes}
         return {"controllers": {**self.controllers, **axes}, "command": command}
 

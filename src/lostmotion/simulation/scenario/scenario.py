@@ -293,8 +293,8 @@ class Scenario:
         names = {self.gear_key(name): name for name in self.tables.gears}
         return self._with({"gears": {**self.tables.gears, **{names[key]: gear for key, gear in gears.items()}}})
 
-    def with_axes(self, axes: Mapping[str, Controller]) -> Self:
-        """The same scenario with other sampled controllers, by the names of their motors, which have no command then; the others stay."""
+    def with_axes(self, axes: Mapping[str, Controller | ContinuousController]) -> Self:
+        """The same scenario with other controllers, by the names of their motors, which have no command then; the others stay."""
         return self._with(self.tables.of_axes(axes))
 
     def with_inertia(self, shaft: str, inertia: float) -> Self:
@@ -562,7 +562,10 @@ def _in_keys(written: Any) -> Iterator[None]:
 def _in_long_form(tables: Mapping[str, Any], written: Any = str) -> TrainTables:
     data = dict(tables)
     use_train_records(data, written)
-    return TrainTables(**data)
+    made = TrainTables(**data)
+    for name in (name for name, shaft in made.shafts.items() if shaft.domain != "rotation"):
+        raise InputError(f"is translation; write the slide as [slides.{name}], with its mass", f"shafts.{name}.domain")
+    return made
 
 
 def _made_again(tables: TrainTables, form: Form) -> Scenario:
