@@ -6,10 +6,10 @@ import cmath
 import math
 from typing import TYPE_CHECKING, Any
 
-from ..control.shaft_ratio import turns
 from ..errors import InputError
 from ..inputs.named_elements import Named
 from ..model.angle_torques import PeriodicTorque
+from ..model.shaft_ratio import turns
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import output_of
 from .joints import actuator_name, actuators_of, joint_id

@@ -12,12 +12,8 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.validation import listed, shown
 from ..mujoco.attaching import alone_on_joint
-<<<<<<< HEAD
 from ..mujoco.joints import compiled, is_slide, joint_id, mass_matrix
 from ..simulation.batches.batch_parameters import mask_of_drives
-=======
-from ..mujoco.joints import compiled, is_slide, joint_id, mass_matrix
->>>>>>> 0be6c54a (Slides are joints of reductions, of drives from MJCF and of the MuJoCo plugin)
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives
 
