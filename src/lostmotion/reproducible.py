@@ -235,7 +235,7 @@ def fourier_sum(real: np.ndarray, imaginary: np.ndarray) -> tuple[np.ndarray, np
 def _fourier_sum(
     real: np.ndarray, imaginary: np.ndarray, c: np.ndarray, s: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """With the cosines and sines of all multiples of ``2 pi/n``."""
+    """The sum with the cosines and sines of all multiples of ``2 pi/n``."""
     n = real.shape[-1]
     p = next((q for q in range(2, math.isqrt(n) + 1) if n % q == 0), n)
     m = n // p

@@ -40,7 +40,7 @@ def harmless_output() -> Iterator[None]:
 
 
 def console(stream: Any, width: int | None = None) -> Console:
-    """For tables and bars of our own, which command the terminal."""
+    """Console for tables and bars of our own; the command sets the terminal."""
     from rich.console import Console
 
     return Console(file=getattr(stream, "stream", stream), width=width)

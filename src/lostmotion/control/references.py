@@ -93,7 +93,7 @@ class Reference(TimeFunction[V], Generic[V]):
         return [*super()._pieces(), *([] if self.samples is None else [self.samples.breakpoints()])]
 
     def pieces(self) -> list[Piece]:
-        """All but the sines: (time [s], value, first, second, third derivative) of each piece, the first from 0 on.
+        """(time [s], value, first, second, third derivative) of each segment of all but the sines, the first from 0 on.
 
         Within a piece the value is ``value + rate s + acceleration s**2/2 + jerk s**3/6``, s seconds after its time.
         """
@@ -130,7 +130,7 @@ class Reference(TimeFunction[V], Generic[V]):
 
     @property
     def duration(self) -> float:
-        """From when on it is constant, but for its sines [s]."""
+        """Time after which the reference is constant, but for its sines [s]."""
         return max([0.0, *(piece[-1][0] for piece in self._pieces())])
 
 
@@ -158,7 +158,7 @@ Law = Literal[
 
 
 class LimitedMove(Part, Generic[V, S, A, J]):
-    """From rest at one position to rest at another, in the shortest time that its limits permit.
+    """A move from rest at one position to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal. With a duration it takes that long, by its law, and must keep its limits.
     """
@@ -175,14 +175,14 @@ class LimitedMove(Part, Generic[V, S, A, J]):
 
 
 class Move(LimitedMove[Angle, Speed, Acceleration, Jerk]):
-    """From rest at one position to rest at another, in the shortest time that its limits permit.
+    """A move from rest at one position to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal.
     """
 
 
 class SlideMove(LimitedMove[Length, LinearSpeed, LinearAcceleration, LinearJerk]):
-    """From rest at one position of a slide to rest at another, in the shortest time that its limits permit.
+    """A move from rest at one position of a slide to rest at another, in the shortest time that its limits permit.
 
     Without a limit of the jerk the speed is trapezoidal.
     """
@@ -297,7 +297,7 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
 
     @property
     def duration(self) -> float:
-        """From when on it is constant, but for its sines [s]; with moves, the end of the last dwell at least."""
+        """Time after which the reference is constant, but for its sines [s]; with moves, the end of the last dwell at least."""
         ends = [end + float(self._of(self.moves[-1], "dwell")) for _, end in self.intervals()[-1:]]
         return max([super().duration, *ends])
 

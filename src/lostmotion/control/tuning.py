@@ -72,7 +72,7 @@ def identical_damping(drive: TwoInertias, damping: float) -> SpeedGains:
 
 
 def identical_radius(drive: TwoInertias) -> SpeedGains:
-    """All poles at the distance w_a from 0: K_i = J_M w_a^2, K_p = 2 sqrt(R) J_M w_a; their damping is sqrt(R)/2.
+    """Gains that place all poles at the distance w_a from 0: K_i = J_M w_a^2, K_p = 2 sqrt(R) J_M w_a; their damping is sqrt(R)/2.
 
     Raises InputError: r > 4, where the poles are real and part.
     """
@@ -86,7 +86,7 @@ def identical_radius(drive: TwoInertias) -> SpeedGains:
 
 
 def identical_real_part(drive: TwoInertias, damping: float) -> SpeedGains:
-    """All poles with the same real part -s, the less damped pair with the damping zeta: K_p = 4 s J_M.
+    """Gains that give all poles the same real part -s, the less damped pair with the damping zeta: K_p = 4 s J_M.
 
     With ``w_1^2 + w_2^2 = 2 w_a^2``, written as ``(1 -+ d) w_a^2``: ``K_i = J_M w_a^2 (1 - d^2)``, ``4 s^2 = (R -
     d^2) w_a^2``, and ``s = zeta w_2`` gives ``d = -2 zeta^2 + sqrt(4 zeta^4 - 4 zeta^2 + R)``. The other pair is

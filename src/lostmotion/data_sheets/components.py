@@ -30,7 +30,7 @@ S = TypeVar("S", bound="GearboxSheet | MotorSheet | ActuatorSheet")
 
 
 class Conditions(Part):
-    """Under which conditions a record is used: keys of `[gearbox]` beside `from`."""
+    """Conditions of use of a record: keys of `[gearbox]` beside `from`."""
 
     temperature: Temperature | None = None  #: temperature of the lubricant; default: the temperature of the data
     added_backlash: Annotated[Angle, NotNegative] = 0.0  #: wear

@@ -152,7 +152,7 @@ class GearboxSheet(GearboxLoads, Record):
         return found[-1] if found else None
 
     def with_losses(self) -> Self:
-        """With the estimated efficiency at rated load and speed, where the sheet prints none."""
+        """The sheet with the estimated efficiency at rated load and speed, where the sheet prints none."""
         estimate = self.loss_estimate()
         if estimate is None or self.rated_input_speed is None:
             return self

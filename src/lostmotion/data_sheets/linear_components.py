@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 class ScrewConditions(Part):
-    """Under which conditions the record of a screw is used: keys of `[screws.NAME]` beside `from`."""
+    """Conditions of use of the record of a screw: keys of `[screws.NAME]` beside `from`."""
 
     nut_preload: Annotated[Force, Positive] | None = None
     """preload of the nut; stiffness and drag of the record are scaled to it. Default: the preload of the record"""

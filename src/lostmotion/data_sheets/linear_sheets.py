@@ -33,7 +33,7 @@ STIFFNESSES = (("stiffness",), ("stiffness_curve",))
 
 
 def _as_it_is(sheet: Any) -> Any:
-    """In place of the checks of a part, which has to be whole; a sheet need not be."""
+    """Replaces the checks of a part: a part has to be whole, a sheet need not be."""
     return sheet
 
 

@@ -75,7 +75,7 @@ class LossEstimate:
 
 
 class LossData(Part):
-    """All that a data sheet may say about losses. Torques at the input shaft unless said otherwise."""
+    """Losses in the forms that data sheets print. Torques are at the input shaft unless said otherwise."""
 
     efficiency: tuple[EfficiencyPoint, ...] = ()  #: while the motor drives
     load_correction: tuple[tuple[Annotated[Number, Positive], Annotated[Number, Positive]], ...] = ()

@@ -1,4 +1,4 @@
-"""From the loss data of a data sheet to the loss map m_2B(mu, v), with the origin of every node.
+"""The loss map m_2B(mu, v) from the loss data of a data sheet, with the origin of every node.
 
 Load mu = T_2 sign(w_M)/T_2R and speed v = |w_M|/n_1R are relative, mu > 0 where the motor drives. The map is put
 together as
@@ -130,7 +130,7 @@ class _Unloaded:
     start: float
 
     def running(self, v: float) -> float:
-        """In motion: straight between the speeds, down to the lesser of starting and slowest running torque."""
+        """Torque in motion: linear between the speeds, down to the lesser of starting and slowest running torque."""
         x, y = [0.0, *self.curve], [min(self.start, next(iter(self.curve.values()))), *self.curve.values()]
         if v <= x[-1]:
             return interpolate(v, x, y)

@@ -1,4 +1,4 @@
-"""From an identification file to the answer."""
+"""Identification: from an identification file to its result."""
 
 from __future__ import annotations
 
@@ -171,7 +171,7 @@ class _Climbed:
 def _climbed(
     rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify, progress: Progress, before: _Climbed | None
 ) -> _Climbed:
-    """All models fitted to logs; the intervals wait until no log is left out any more.
+    """Fits all models to the logs; the intervals wait until no further log is left out.
 
     Models are compared under one course of inputs between samples. If the model that is taken turns an input to the other course,
     all models are fitted again, each from its own start. Without a few of many logs the models continue from the values that they
@@ -317,7 +317,7 @@ def _with_model_error(
 
 
 def _notes(logs: list[Prepared]) -> dict[str, tuple[str, ...]]:
-    """By log; a note that several logs share is given once, with their number and the numbers of the first."""
+    """Notes by log; a note that several logs share is given once, with their number and the numbers of the first."""
     takers: dict[str, list[tuple[str, str]]] = {}
     for log in logs:
         for note in log.log.notes:
@@ -349,7 +349,7 @@ def _resting(problem: FitProblem, fit: Fit) -> list[Undetermined]:
 def residual_table(
     result: IdentificationResult, variables: tuple[str, ...] = (), logs: Sequence[str] | None = None
 ) -> dict[str, dict[str, np.ndarray]]:
-    """By log: time, measured and computed channels, and variables of the rig along the run; NaN of a log that has no run.
+    """Time, measured and computed channels, and variables of the rig along the run, by log; NaN for a log without a run.
 
     logs: names of the logs; left out, all.
     """

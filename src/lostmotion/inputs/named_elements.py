@@ -31,7 +31,7 @@ class Named(dict[str, V]):
         return hash(tuple(self.items()))
 
     def __eq__(self, other: object) -> bool:
-        """In the same order, too: it is the order of the equations."""
+        """Compares the order, too: it is the order of the equations."""
         return isinstance(other, dict) and list(self.items()) == list(other.items())
 
     def __ne__(self, other: object) -> bool:

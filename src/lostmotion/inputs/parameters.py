@@ -1,4 +1,4 @@
-"""What `help` shows of a part: its parameters with units, ranges and defaults, in place of the internals of pydantic."""
+"""Text that `help` shows of a part: its parameters with units, ranges and defaults, in place of the internals of pydantic."""
 
 from __future__ import annotations
 

@@ -47,6 +47,6 @@ def _value(value: Any) -> str:
 
 
 def without_empty(tables: Mapping[str, Any]) -> dict[str, Any]:
-    """Without lists and tables that are empty."""
+    """The tables without empty lists and tables."""
     found = {k: without_empty(v) if isinstance(v, Mapping) else v for k, v in tables.items()}
     return {k: v for k, v in found.items() if not (isinstance(v, Mapping | list | tuple | str) and not v)}

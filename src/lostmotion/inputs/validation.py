@@ -122,7 +122,7 @@ def nearest(given: str, choices: Iterable[str]) -> str:
 
 
 def _words(name: str) -> list[str]:
-    """In lower case; they are parted by anything but letters and digits, or begin with a capital."""
+    """The words of a name, in lower case. Anything but letters and digits separates words, and a capital begins one."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name)
     return re.split(r"[^a-z0-9]+", parted.lower())
 

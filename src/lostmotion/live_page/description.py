@@ -173,7 +173,7 @@ def _torque_at(scenario: Scenario, shaft: str) -> float:
 
 
 def _usual_friction(scenario: Scenario, key: str) -> float:
-    """To where the slider of a friction torque goes that is 0 [N·m]."""
+    """Upper end of the slider of a friction torque that is 0 [N·m]."""
     table, *names = key.split(".")
     if table == "motors":
         return 0.2 * _torque_at(scenario, scenario.train().motors[names[0]].shaft)

@@ -81,12 +81,12 @@ def unit_of(si_unit: str, value: float) -> tuple[str, float]:
 
 
 def around(value: float, ways: float = 10.0) -> Range:
-    """From a share to a multiple of a value."""
+    """The range from a share to a multiple of a value."""
     return Range(value / ways, value * ways, logarithmic=True)
 
 
 def from_zero(value: float, usual: float = 0.0) -> Range:
-    """To a few times a value, or where it is 0 to a usual one."""
+    """The range from 0 to four times a value, or to the usual value where it is 0."""
     return Range(0.0, 4.0 * value if value > 0.0 else usual)
 
 

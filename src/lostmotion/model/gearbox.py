@@ -78,7 +78,7 @@ class Transmission(TransmissionFields):
         return self
 
     def with_losses(self, factor: float) -> Self:
-        """With losses that are known: `factor` times those of the map."""
+        """The gearbox with known losses: `factor` times the losses of the map."""
         return self.model_copy(update={"losses": self.losses.scaled(factor), "loss_range": None})
 
     @model_validator(mode="after")

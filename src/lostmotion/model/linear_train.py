@@ -23,7 +23,7 @@ COGGING = "_cogging"  # behind the name of a linear motor
 
 
 class LinearElements(TrainElements):
-    """All of a drive train but its shafts and slides, as scenarios have it."""
+    """The elements of a drive train besides its shafts and slides, as scenarios have them."""
 
     screws: Elements[Screw] = Field(default_factory=nothing)
     racks: Elements[Rack] = Field(default_factory=nothing)

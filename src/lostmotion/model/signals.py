@@ -120,7 +120,7 @@ class Samples(Part, Generic[V]):
         return self._held(_polyline(self.times, values))
 
     def _held(self, points: list[Breakpoint]) -> list[Breakpoint]:
-        """With the first value from 0 on."""
+        """The points with the first value from 0 on."""
         return points if self.times[0] == 0.0 else [(0.0, points[0][1], 0.0), *points]
 
 
@@ -159,7 +159,7 @@ class TimeFunction(Part, Generic[V]):
         return [*own, *((s.amplitude, s.frequency, s.phase) for s in self.sines)]  # type: ignore[list-item]
 
     def breakpoint_list(self) -> list[Breakpoint]:
-        """All but the sines, from t = 0 on."""
+        """The segments of all but the sines, from t = 0 on."""
         pieces = self._pieces()
         orders = range(1, self.derivatives + 1)
         mean = real(self.mean)

@@ -308,7 +308,7 @@ class Winding(Part):
         return next((factor * value for value, factor in values if value is not None), None)
 
     def phase_values(self) -> PhaseValues:
-        """In the quantities of the equations."""
+        """The values in the quantities of the equations."""
         L_d, L_q = self._inductances()
         resistance = self._one(RESISTANCE)
         assert resistance is not None

@@ -23,7 +23,7 @@ from .torsion import Rigid
 
 
 class TrainElements(Part):
-    """All of a drive train but its shafts."""
+    """The elements of a drive train besides its shafts."""
 
     mass_matrices: Elements[MassMatrix] = Field(default_factory=nothing)
     motors: Elements[ShaftMotor] = Field(default_factory=nothing)

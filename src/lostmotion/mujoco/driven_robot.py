@@ -132,7 +132,7 @@ class Actuated:
 
     @property
     def drives(self) -> dict[str, Scenario]:
-        """By joint: the drive, with the inertia of the robot in place of its load's own."""
+        """The drive of each joint, with the inertia of the robot in place of the load's own."""
         return {name: d.drive for name, d in self._drives.items()}
 
     def simulation(self, joint: str) -> Any:

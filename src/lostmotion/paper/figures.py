@@ -427,7 +427,7 @@ def _loss_panels() -> tuple[Panel, Panel]:
 
 
 def _plainly(panel: Panel) -> Panel:
-    """Without TeX, and with both ends of the range of y."""
+    """The panel without TeX, and with both ends of the range of y."""
     curves = tuple(
         replace(c, label=plain(c.label), legend=None if c.legend is None else plain(c.legend)) for c in panel.curves
     )

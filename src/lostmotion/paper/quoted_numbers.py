@@ -41,7 +41,7 @@ class Facts:
 
 
 def facts(results: Results) -> Facts:
-    """All numbers, from the runs."""
+    """The quoted numbers, computed from the runs."""
     runs = results.runs
     rigid = paper_scenario("1-DOF-L", "large")
     constants_of_rigid = rigid_constants(rigid)

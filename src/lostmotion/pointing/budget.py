@@ -104,7 +104,7 @@ class PointingBudget:
     """largest permitted error [rad, m] of axes that have one"""
 
     def contributions(self, axis: str) -> dict[str, float]:
-        """By how much the mean square error of an axis falls [rad², m²] with each cause as all are taken away one after another.
+        """Fall of the mean square error of an axis [rad², m²] with each cause, as all are taken away one after another.
 
         They add up to ``whole[axis].rms**2 - ideal[axis].rms**2``; one that is negative hides another.
         """
@@ -238,7 +238,7 @@ def _by_order(scenario: Scenario, motor: str) -> Spectrum | str:
 
 
 def _end_of_transient(scenario: Scenario, as_it_is: OneRun) -> tuple[float, str]:
-    """From when on errors do not depend on how the axes start [s], and the line that says so."""
+    """The time [s] from which on errors do not depend on how the axes start, and the line that states it."""
     if not scenario.axes():
         return 0.0, "errors count from the start, at which each stepper is aligned (--after leaves a beginning out)"
     time, first, _ = as_it_is
@@ -267,7 +267,7 @@ def first_gap(times: np.ndarray, quiet: float) -> float:
 
 
 def _other_start(scenario: Scenario) -> Callable[[dict[str, Any]], None]:
-    """On the reference; where the axes begin on it, at rest there."""
+    """The change to another start: on the reference, or at rest where the axes begin on the reference."""
     angles = dict(scenario.begin().angles)
 
     def change(data: dict[str, Any]) -> None:

@@ -82,7 +82,7 @@ class _Equations:
         )
 
     def of(self, shafts: Collection[str]) -> set[str]:
-        """All that acts on these shafts, and on those that move with them."""
+        """Names of all that acts on these shafts, and on the shafts that move with them."""
         train, group = self._train, set().union(*(self._group[shaft] for shaft in shafts))
         found = {train.variable(shaft, "load_torque") for shaft in group}
         for others in self._beside():

@@ -80,7 +80,7 @@ class Declared:
 
 @dataclass(frozen=True)
 class Model:
-    """All that is said of an FMU."""
+    """Description of the model in an FMU."""
 
     title: str
     guid: str

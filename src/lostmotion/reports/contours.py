@@ -13,7 +13,7 @@ LINES = 6  # about so many contours of a map
 
 @dataclass(frozen=True)
 class Contour:
-    """All places where the quantity has one value."""
+    """The places where the quantity has one value."""
 
     text: str
     x: np.ndarray  # ends of straight segments, with NaN between two segments

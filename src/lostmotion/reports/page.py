@@ -62,7 +62,7 @@ class Prose:
 
 @dataclass(frozen=True)
 class Report:
-    """All of a page, in its order."""
+    """The parts of a page, in their order."""
 
     title: str
     lead: str

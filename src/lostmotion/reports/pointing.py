@@ -84,7 +84,7 @@ def _dotted(k: int) -> dict[str, Any]:
 
 
 def _unit(budget: PointingBudget, axis: str | None = None) -> tuple[float, str]:
-    """In which errors are shown: how many of one rad or m, and the unit of an axis, or of all."""
+    """Factor from rad or m to the unit in which errors are shown, and this unit, for an axis or for all."""
     if budget.orders and set(_units(budget, axis)) == {"rad"}:  # axes of steppers belong to mounts
         return ARCSEC, "arcsec"
     factor, prefix = (1e6, "µ") if max(e.peak for e in budget.whole.values()) < 5e-5 else (1e3, "m")

@@ -153,7 +153,7 @@ def mesh_lines(result: xarray.Dataset | RunArrays) -> list[str]:
 
 
 def error_lines(result: xarray.Dataset | RunArrays) -> list[str]:
-    """By how much currents, torques and speeds of motors under field-oriented control may be wrong, and their largest values."""
+    """Bounds on the errors of currents, torques and speeds of motors under field-oriented control, and their largest values."""
     bounds = errors_of(result)
     if not bounds:
         return []
@@ -237,7 +237,7 @@ def _motion_lines(result: xarray.Dataset) -> list[str]:
 
 
 def _stuck(result: xarray.Dataset | RunArrays) -> list[tuple[float, str]]:
-    """For which share of the time each contact that sticks is stuck, and the same in words."""
+    """Share of the time for which each sticking contact is stuck, and the same in words."""
     flanks = Scenario.from_json(result.attrs["scenario"]).train().flanks()
     share, found = weights(np.asarray(result["time"])), []
     names = (v.name for v in recorded_variables(result.attrs))

@@ -196,7 +196,7 @@ def _in_terms_of(train: DriveTrain, name: str, last: str, ratio: float) -> str:
 
 
 def ratios_to(train: DriveTrain, last: str) -> dict[str, float]:
-    """For each shaft its speed over the speed of the last one, by the gears between them.
+    """Speed of each shaft over the speed of the last one, by the gears between them.
 
     Shafts that no gear joins to the last one are in terms of the last of their own, such as the slides of a mass matrix.
     """

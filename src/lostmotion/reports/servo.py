@@ -184,7 +184,7 @@ def _phase_panel(
 
 
 def _gain(response: np.ndarray) -> np.ndarray:
-    """In dB, without what rounding makes of no gain at all."""
+    """The gain in dB; a gain that is rounding alone is left out."""
     magnitude = np.abs(response)
     return np.where(magnitude > 1e-9, 20.0 * np.log10(np.maximum(magnitude, 1e-9)), np.nan)
 

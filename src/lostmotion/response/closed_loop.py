@@ -82,7 +82,7 @@ class ClosedLoop:
         self.simulation.advance(ticks * w.tick - self.simulation.time, **self.constants)
 
     def follow(self) -> None:
-        """Over one window."""
+        """Advance over one window."""
         self._to(self.window.samples)
         self._next()
 
@@ -91,8 +91,8 @@ class ClosedLoop:
         self.windows += 1
 
     def record(self) -> tuple[np.ndarray, np.ndarray]:
-        """Over one window, with the variables of the plant and what the controllers remember and show at each sample, (variable,
-        sample)."""
+        """Advance over one window and record the variables of the plant and the memory and signals of the controllers
+        at each sample, (variable, sample)."""
         rows, slots = [], []
         windings = list(self.simulation.winding_torques())
         for sample in range(1, self.window.samples + 1):
@@ -114,7 +114,7 @@ class ClosedLoop:
         return np.array([*now["state"], *now["memory"], *repeating]), tuple(now["regime"])
 
     def set_state(self, numbers: np.ndarray) -> None:
-        """In the present modes."""
+        """Set the state, in the present modes."""
         now = self.core.get_state()
         v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
         known = n + len(now["inputs"])  # of the course: rates, and the inputs that they belong to
@@ -126,7 +126,7 @@ class ClosedLoop:
 
 
 class _UnderSine(Simulation):
-    """With references that are constant but for the source, which is a sine; as a load torque it is an input of the simulation."""
+    """A plant whose references are constant but for the source, which is a sine; a load torque is an input of the simulation."""
 
     def __init__(self, plant: Plant, source: str, amplitude: float, frequency: float, law: Any) -> None:
         self._sines = {source: (amplitude, frequency)}

@@ -46,7 +46,7 @@ class StepResponse:
 
     @property
     def rise_time(self) -> float:
-        """From 10 to 90 % [s]; NaN if it does not get there."""
+        """Time from 10 to 90 % of the step [s]; NaN if it does not get there."""
         share = self.value / self.size
         reached = [np.flatnonzero(share >= level) for level in (0.1, 0.9)]
         return float(self.time[reached[1][0]] - self.time[reached[0][0]]) if all(map(len, reached)) else math.nan
@@ -58,12 +58,12 @@ class StepResponse:
 
     @property
     def settling_time(self) -> float:
-        """Until it stays within 2 % of the step [s]; NaN if it does not."""
+        """Time until the error stays within 2 % of the step [s]; NaN if it does not."""
         return settled(self.time, self.value - self.size, 0.02 * abs(self.size))
 
 
 def settled(time: np.ndarray, error: np.ndarray, window: float) -> float:
-    """From the first instant until an error stays within a window to the last [s]; NaN if it is outside at the last."""
+    """Time from the first instant until an error stays within a window to the last [s]; NaN if it is outside at the last."""
     outside = np.flatnonzero(np.abs(error) > window)
     if len(outside) == 0:
         return 0.0
@@ -214,7 +214,7 @@ class Following:
 
 
 def following(axis: Axis) -> Following:
-    """Over the run of the scenario."""
+    """Following error over the run of the scenario."""
     data = ran(axis)
     time, reference = data["time"], axis.controller.reference
     wanted = reference.at(time)[0]

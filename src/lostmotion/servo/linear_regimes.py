@@ -173,7 +173,7 @@ class Regime:
 
     @classmethod
     def of(cls, axis: Axis, name: str, meaning: str, model: LinearModel) -> Regime:
-        """With its transition over a base tick of the axis, by the matrix exponential."""
+        """The regime with its transition over a base tick of the axis, by the matrix exponential."""
         need("scipy", "The analysis of a loop", "control")
         from scipy.linalg import expm
 

@@ -92,7 +92,7 @@ class LinearLoop:
 
     @property
     def _plant_states(self) -> int:
-        """With the currents of a winding."""
+        """Number of states of the plant, with the currents of a winding."""
         return len(self.model.states) + (0 if self.regime.winding is None else 2)
 
     def _tick(self, tick: int) -> tuple[np.ndarray, np.ndarray, dict[str, LinearForm]]:
@@ -192,7 +192,7 @@ class LinearLoop:
         return np.asarray(state @ row[:n] + direct @ row[n:])
 
     def response(self, frequency: Any, *, feedforward: bool = True, signal: str | None = None) -> np.ndarray:
-        """From a sine of the loop's reference to what the loop measures, at its samples.
+        """Response from a sine of the loop's reference to its measured value, at its samples.
 
         Parameters
         ----------

@@ -205,7 +205,7 @@ def _apart(axis: Axis, cycles: int, period: float, interval: float) -> float:
 
 
 def settling(moves: Moves, rest: AtRest, window: float) -> list[Settling]:
-    """After each move of the last cycle, and after the last move, behind which the position is held.
+    """Settling after each move of the last cycle, and after the last move, behind which the position is held.
 
     rest: what follows the last move.
     """
@@ -255,7 +255,7 @@ def _seen(moves: Moves, rest: AtRest) -> _Seen:
 
 
 def _patience(moves: Moves) -> float:
-    """Until when the last position is held where an input never rests [s]."""
+    """Time until which the last position is held where an input never rests [s]."""
     scenario = moves.axis.scenario
     of_inputs = [sine for signal in scenario.signals().values() for sine in signal.sine_list()]
     of_inputs += [sine for c in scenario.axes().values() for sine in c.reference.sine_list()]

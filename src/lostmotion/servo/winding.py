@@ -69,7 +69,7 @@ class OrientedWinding:
 
     @classmethod
     def of(cls, train: DriveTrain, name: str, c: Controller, law: _core.Axis, model: LinearModel) -> OrientedWinding:
-        """In the regime of a linear model, at the speed of its point.
+        """The winding in the regime of a linear model, at the speed of its point.
 
         name: of the motor with field-oriented control.
         c, law: its controller, and what the solver makes of that.
@@ -157,7 +157,7 @@ class OrientedWinding:
 
     @property
     def least_direct(self) -> float:
-        """Beyond it the voltage would rise again [A]."""
+        """Least i_d [A], beyond which the voltage would rise again."""
         return -min(self.largest_current, self.phase.flux_linkage / self.phase.inductance_d)
 
     def _wanted(self, torque: float, weakening: float) -> np.ndarray:
@@ -201,7 +201,7 @@ class OrientedWinding:
         return Steady(reference, wanted, weakening, asked)
 
     def _kept(self, torque: float) -> Steady | None:
-        """With the field weakened as the voltage needs it; None where current and voltage do not suffice."""
+        """The steady state with the field weakened as the voltage requires; None where current and voltage do not suffice."""
         from scipy.optimize import brentq
 
         share = self.loop.weakening_voltage if self.loop.field_weakening > 0.0 else 1.0
@@ -220,7 +220,7 @@ class OrientedWinding:
 
     @cached_property
     def steady(self) -> Steady:
-        """With the torque of the regime, or with the largest part that current and voltage permit."""
+        """The steady state with the torque of the regime, or with the largest part that current and voltage permit."""
         found, low, high = self._kept(self.torque), 0.0, 1.0
         if found is not None:
             return found

@@ -247,7 +247,7 @@ def _over_estimates(scenario: Scenario, findings: list[Finding]) -> list[Finding
 
 
 def _known_losses(scenario: Scenario, end: int) -> Scenario:
-    """With the losses at one end of the range of each estimate."""
+    """The scenario with the losses at one end of the range of each estimate."""
     parts = scenario.gears_by_key()
     known = {key: p.with_losses(p.loss_range[end]) for key, p in parts.items() if p.loss_range is not None}
     return scenario.with_gears(known) if known else scenario

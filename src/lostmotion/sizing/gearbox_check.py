@@ -50,7 +50,7 @@ def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox"
 
 
 def _with_momentary(finding: Finding, torque: float, momentary: float | None) -> Finding:
-    """Beyond, or without, a repeated peak torque: what the limit for emergency stops says."""
+    """Adds the limit for emergency stops, where a repeated peak torque is exceeded or missing."""
     if momentary is None or finding.verdict == "ok":
         return finding
     if torque > momentary:

@@ -170,17 +170,17 @@ class _Axis:
 
     @property
     def period(self) -> float:
-        """Of small oscillations in the field [s]."""
+        """Period of small oscillations in the field [s]."""
         return 2.0 * math.pi / math.sqrt(self.pole_pairs * self.torque / self.inertia)
 
     def pull_out(self, rate: float) -> float:
-        """From the data; of an ideal current the holding torque."""
+        """Pull-out torque from the data; for an ideal current the holding torque."""
         if any(getattr(self.motor, key) is None for key in ELECTRIC):
             return self.torque
         return float(pull_out_torque(self.motor, rate * self.motor.full_step))
 
     def pull_in(self, rate: float) -> float:
-        """From the data: the largest torque T with which the rotor does not swing to where it slips.
+        """Pull-in torque from the data: the largest torque T with which the rotor does not swing to where it slips.
 
         It begins to turn at the lag asin(T/T_H), and the field then leads by n w. Its energy relative to the field is enough
         to pass the unstable lag pi - asin(T/T_H) where n J w^2/2 > T_H (2 sqrt(1 - t^2) - t (pi - 2 asin t)) with t = T/T_H.

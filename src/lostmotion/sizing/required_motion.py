@@ -122,11 +122,11 @@ class InputDemand:
 
     @property
     def whole(self) -> Gearbox:
-        """All that is between the motor and the load."""
+        """The gearbox that stands for everything between the motor and the load."""
         return self.with_stage or self.gearbox
 
     def cycle(self, motor_torque: np.ndarray) -> DutyCycle:
-        """With the torque of the motor [N·m], the duty cycle that the rules are for."""
+        """The duty cycle for the torque of the motor [N·m]."""
         m = self.motion
         return DutyCycle(m.time, np.abs(self.speed), m.torque, motor_torque, None, m.cycle)
 

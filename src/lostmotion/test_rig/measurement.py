@@ -1,4 +1,4 @@
-"""All that the rig measures of one gearbox."""
+"""Measurements of one gearbox on the rig."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class RigReport:
-    """All measurements of one gearbox."""
+    """Measurements of one gearbox."""
 
     gearbox: Gearbox
     map: xarray.Dataset

@@ -1,4 +1,4 @@
-"""All that the rig measures of one screw, and the same beside what its data sheet says."""
+"""Measurements of one screw on the rig, beside the values of its data sheet."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ WORK = 2 * len(SHARES) + len(TURNING) + len(LOOPS) + 6  # how often `measure_scr
 
 @dataclass(frozen=True)
 class ScrewReport:
-    """All measurements of one screw."""
+    """Measurements of one screw."""
 
     screw: ScrewData
     load: float

@@ -239,7 +239,7 @@ def _temperature(number: Decimal, units: Product, symbol: str) -> float:
 
 
 def _unknown(digits: str, text: str, symbol: str, unit: str) -> str:
-    """For a unit that cannot be read: the nearest spellings that the key can take."""
+    """Message on a unit that cannot be read: the nearest spellings that the key can take."""
     if not symbol:
         what = f"is not one number with one unit ({text}); write {_wanted(unit)}"
         changes = [re.sub("1000 ?(?=[A-Za-z])", "k", text)]
@@ -256,7 +256,7 @@ def _unknown(digits: str, text: str, symbol: str, unit: str) -> str:
 
 
 def _of_something_else(digits: str, units: Product, symbol: str, unit: str) -> str:
-    """For a unit that does not fit the key: what it may have meant, else what is wanted."""
+    """Message on a unit that does not fit the key: what it may have meant, else what is wanted."""
     wanted = _known(unit)
     rate = {name: power for name, power in wanted.items() if name == "second"}
     if wanted == {"radian": 1} | rate and rate and (ratio := _ratio(units, rate)) is not None:

@@ -124,7 +124,7 @@ class Drives:
 
     @property
     def doubts(self) -> Any:
-        """Of each drive, what was not certain in its last step, as bits; 0: all was."""
+        """Uncertainties in the last step of each drive, as bits; 0: all was certain."""
         return self._arrays.doubts
 
     @property
@@ -217,7 +217,7 @@ class Drives:
         return self._keys[number]
 
     def _input(self, what: str, value: Any, kept: Any, each: str = "drive") -> Any:
-        """What a kernel reads: an array of Warp as it is, or else an array of the same shape, with the numbers that are given."""
+        """Input of a kernel: an array of Warp as it is, or else an array of the same shape, with the given numbers."""
         if isinstance(value, self._wp.array):
             if value.shape != kept.shape or value.dtype != self._number:
                 raise InputError(f"{what}: must have {len(kept)} numbers of type {self._dtype}")

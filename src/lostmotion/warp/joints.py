@@ -135,14 +135,14 @@ class Joints:
             group.engine.told.assign(np.where(both, 0.0, rows).reshape(-1).astype(rows.dtype))
 
     def __getitem__(self, name: str) -> Any:
-        """By joint a variable of its drives where the step began: ``motor_speed``, ``load_speed``, ``twist`` or ``output_torque``; arrays of Warp."""
+        """A variable of the drives by joint, where the step began: ``motor_speed``, ``load_speed``, ``twist`` or ``output_torque``; arrays of Warp."""
         if name == "load_angle":
             raise InputError("load_angle: is that of MuJoCo; read d.qpos")
         return {joint: group.rows(group.drives[name], k, self._worlds) for joint, (group, k) in self._places.items()}
 
     @property
     def parameters(self) -> Mapping[str, Mapping[str, Any]]:
-        """By joint the parameters by their keys, as arrays of Warp with a number for each world, which may be written."""
+        """The parameters by joint and key, as arrays of Warp with a number for each world, which may be written."""
         return {
             joint: {key: group.rows(row, k, self._worlds) for key, row in group.drives.parameters.items()}
             for joint, (group, k) in self._places.items()

@@ -209,7 +209,7 @@ def drive_arrays(dtype: str) -> Any:
 
 @cache
 def engine_arrays(dtype: str) -> Any:
-    """What drives read and write of the joints that they turn, as a structure of Warp."""
+    """Data that drives read and write of the joints that they turn, as a structure of Warp."""
     number = NUMBER[dtype]
 
     @wp.struct

@@ -30,7 +30,7 @@ class Interval:
 
 
 def bootstrap(problem: FitProblem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:
-    """By resampling blocks of the residuals, with one Gauss-Newton step for each sample.
+    """Intervals from resampled blocks of the residuals, with one Gauss-Newton step for each sample.
 
     Segments of the gradient of half a second each are drawn with replacement. Lasting errors, such as the errors of
     an incomplete model, widen the interval. It is at least the interval of independent errors: a few blocks say little. With
@@ -98,7 +98,7 @@ def _student(freedom: int) -> float:
 
 
 def widest(a: Interval, b: Interval) -> Interval:
-    """From the lower of two lower ends to the higher of two higher ones."""
+    """The interval from the lower of two lower ends to the higher of two higher ones."""
     return replace(a, low=min(a.low, b.low), high=max(a.high, b.high))
 
 

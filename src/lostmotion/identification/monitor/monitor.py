@@ -98,7 +98,7 @@ class MonitorResult:
         return "\n".join(self.lines())
 
     def _fits(self) -> str:
-        """What was watched, and has not happened."""
+        """The watched changes that have not happened."""
         watches = list(self.task.monitor.watch.values())
         one_way = any(w.direction != "both" for w in watches)
         limited = any(w.min is not None or w.max is not None for w in watches)
@@ -303,7 +303,7 @@ class _Estimator:
         self._smallest = math.inf
 
     def of_baseline(self) -> _Estimator:
-        """From the medians of the logs so far."""
+        """The estimator that starts from the medians of the logs so far."""
         r = self.reference
         values = {name: self._median(name) for name in r.free}
         of_logs = (
@@ -356,7 +356,7 @@ class _Estimator:
         return replace(problem, parameters=r.free, given=r.deviations)
 
     def _fit(self, problem: FitProblem) -> tuple[Fit, list[np.ndarray]]:
-        """From the median of the logs so far; where that ends in residuals that are no noise, from other values too."""
+        """The fit from the median of the logs so far; if it leaves residuals that are not noise, from other values too."""
         own = start_point(self.reference.rig.task, problem.logs).nuisance
         near = {name: self._median(name) for name in self.reference.free}
         start = ParameterPoint({**self.reference.values, **near}, own)

@@ -148,7 +148,7 @@ class _Series:
         return ""
 
     def watched(self, name: str, p: FreeParameter, watch: Watch, rate: float) -> Watched:
-        """With the sentence on a parameter."""
+        """Adds the sentence on a parameter."""
         change = self.change(watch.direction, rate)
         if change is None or (lacking := self._lacking(change)):
             return self._undecided(name, p.unit, change, self._lacking(change) if change is None else lacking)

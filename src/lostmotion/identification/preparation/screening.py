@@ -134,7 +134,7 @@ def _spread(log: Log) -> Log:
 
 
 def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
-    """With NaN where a measured channel is not a number, and without samples in which an input is none."""
+    """The log with NaN where a measured channel is not a number, and without samples in which an input is not a number."""
     for name in dict.fromkeys((*inputs, *measured)):
         bad = ~(np.abs(log.values(name)) < HUGE)
         if bad.all():
@@ -154,7 +154,7 @@ def _numbers(log: Log, measured: list[str], inputs: list[str]) -> Log:
 
 
 def _without(log: Log, name: str, bad: np.ndarray, acts: bool, note: str) -> Log:
-    """Without some samples of a channel: all of the log's if the channel acts, else NaN there, so that inputs keep theirs."""
+    """The log without some samples of a channel: without the whole samples if the channel acts, else with NaN in the channel alone."""
     if acts:
         return log.only(~bad, f"dropped {note}")
     channel = log.channels[name]
@@ -165,7 +165,7 @@ def _without(log: Log, name: str, bad: np.ndarray, acts: bool, note: str) -> Log
 
 
 def _without_glitches(log: Log, name: str, acts: bool) -> Log:
-    """Without single samples that jump away and back."""
+    """The log without single samples that jump away and back."""
     there = np.flatnonzero(np.isfinite(log.values(name)))
     x = log.values(name)[there]
     step = np.diff(x)

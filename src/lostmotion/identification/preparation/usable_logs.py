@@ -22,7 +22,7 @@ MANY = 12  # values of what a condition names, up to which they are listed
 
 
 def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]:
-    """All logs of a task that can be used, screened, and by name of the others why they cannot.
+    """(the usable logs of a task, screened; reasons by name why the others cannot be used).
 
     Raises InputError: a name stands for no file, or half of the logs or more cannot be used: then it is rather the task
         that is wrong.

@@ -344,7 +344,7 @@ def _member(message: Any, name: str) -> Any:
 
 
 def _courses(path: Path, topic: str, rows: list[tuple[int, Any]], long: set[str]) -> dict[str, Course]:
-    """By channel, NaN in messages that lack it; names of lists that are too long go to ``long``."""
+    """Courses by channel, NaN in messages that lack it; names of lists that are too long go to ``long``."""
     found: dict[str, np.ndarray] = {}
     for k, (_, message) in enumerate(rows):
         for name, value in _shallow(path, topic, message, long):

@@ -44,7 +44,7 @@ class Stretch:
 
 
 def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: ShownMotion, width: int) -> list[Stretch]:
-    """All of a log that is long enough.
+    """The stretches of a log that are long enough.
 
     width: samples of the filter, cubics by least squares (Savitzky and Golay 1964), and of a block; odd.
     """

@@ -87,7 +87,7 @@ class Measuring:
         return np.array(found)
 
     def _at(self, name: str) -> np.ndarray:
-        """On a fine grid before a filter, else when the channel is read."""
+        """Instants of a channel: a fine grid before a filter, else the instants at which it is read."""
         numbers = self._numbers[name]
         return self._grid if numbers["filter_time"] > 0.0 else self._read(numbers)
 
@@ -107,7 +107,7 @@ class Measuring:
         return np.asarray(numbers["scale"] * x + numbers["offset"])
 
     def _rate(self, name: str, x: np.ndarray, rate: np.ndarray | None, numbers: Mapping[str, float]) -> np.ndarray:
-        """By time of what a channel shows."""
+        """Time derivative of what a channel shows."""
         at = self._read(numbers)
         inside = (at > self._log.begin) & (at < self._log.time[-1])
         if (tau := numbers["filter_time"]) > 0.0:
@@ -158,7 +158,7 @@ def _slopes(at: np.ndarray, t: np.ndarray, x: np.ndarray) -> np.ndarray:
 
 
 def _filtered(t: np.ndarray, x: np.ndarray, tau: float) -> np.ndarray:
-    """Through a first-order low pass that begins in rest, straight between samples; rows x instants or instants."""
+    """The output of a first-order low pass that begins at rest, linear between samples; rows x instants or instants."""
     h = t[1] - t[0]
     a = float(np.exp(-h / tau))
     share = (1.0 - a) * tau / h

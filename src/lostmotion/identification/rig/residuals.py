@@ -26,7 +26,7 @@ class ParameterPoint:
     nuisance: dict[str, dict[str, float]]
 
     def of(self, log: Prepared) -> dict[str, float]:
-        """All values that the run of a log takes."""
+        """All values that the run of a log takes: parameters and nuisances."""
         return self.values | self.nuisance.get(log.name, {})
 
 

@@ -55,7 +55,7 @@ class Formula:
             self._refuse(node)
 
     def value(self, values: Values) -> Any:
-        """With the values of its names. Raises ValueError: a name has no value, or the result is no finite number."""
+        """The value for given values of the names. Raises ValueError: a name has no value, or the result is no finite number."""
         for name in sorted(self.names):
             if name not in values:
                 meant = did_you_mean(name, values, f"known are {', '.join(sorted(values)) or 'none'}")

@@ -88,7 +88,7 @@ def misfits(problem: FitProblem, residuals: Sequence[np.ndarray]) -> list[Misfit
 def with_shapes(
     problem: FitProblem, point: ParameterPoint, residuals: Sequence[np.ndarray], found: Sequence[Misfit]
 ) -> list[Misfit]:
-    """With the variables over which structured residuals have a shape: time, and speed, angle and load of the rig."""
+    """Adds the variables over which structured residuals have a shape: time, and speed, angle and load of the rig."""
     if not any(m.structured for m in found):
         return list(found)
     variables = shape_variables(problem.engine.rig)
@@ -132,7 +132,7 @@ def _with_derivatives(rows: Sequence[np.ndarray], m: Misfit) -> list[tuple[np.nd
 
 
 def _derivative(x: np.ndarray, width: int, order: int) -> np.ndarray:
-    """By samples, of local cubics; NaN where there is not a number, and near the ends."""
+    """Derivative by samples, from local cubics; NaN where there is not a number, and near the ends."""
     from scipy.signal import savgol_filter
 
     there = np.isfinite(x)

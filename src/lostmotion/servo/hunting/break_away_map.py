@@ -53,7 +53,7 @@ class Transients:
         return Transients(factor * self.middle, abs(factor) * self.radius)
 
     def after(self, rates: np.ndarray, first: float, last: float) -> Transients:
-        """After a time between two."""
+        """The transients after a time between two."""
         first, last = min(first, 1e6 / np.abs(rates.real).min(initial=1.0)), min(last, 1e300)
         decay = np.exp(rates * first)
         if not np.abs(rates).max(initial=0.0) * (last - first) < 1.0:
@@ -74,7 +74,7 @@ class SlipsFromInterval:
 
     @classmethod
     def begin(cls, contact: StickSlip, low: float, high: float, left: Transients) -> SlipsFromInterval:
-        """From errors between two, with what the stuck interval before has left."""
+        """The slips from errors between two, with the transients that the stuck interval before has left."""
         middle = 0.5 * (low + high) * contact.q + contact.excess * contact.p + contact.freed @ left.middle
         radius = np.abs(contact.freed) @ left.radius
         return cls(contact, middle, 0.5 * (high - low) * contact.q, np.asarray(radius))
@@ -121,7 +121,7 @@ class SlipsFromInterval:
 
     @property
     def latest(self) -> float:
-        """After which a slip counts as endless [s]."""
+        """Time after which a slip counts as endless [s]."""
         return float(LATEST / np.abs(self.contact.slip_rates.real).min())
 
     @cached_property

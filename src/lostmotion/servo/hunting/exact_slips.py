@@ -91,7 +91,7 @@ class Slips:
         return Pieces(centre, none + mode, none, np.zeros(k), none.copy(), slope, 0.0 * centre, strip, -side, side)
 
     def _freed(self, start: np.ndarray, b: np.ndarray, rise: float) -> Pieces:
-        """After the tick in which the torque with its lag rises to the break-away: ``start + b (w - 1) rise`` before it.
+        """Starts after the tick in which the torque with its lag rises to the break-away: ``start + b (w - 1) rise`` before it.
 
         All torques are shifted by w. For w = 1 the torque is ``T_S + gap (1 - exp(-t / lag))``, and rises over a tick by
         ``rise``. It breaks away when this is above T_S by ``(1 - w) rise``. Speed and angle after the tick are integrals
@@ -188,7 +188,7 @@ class Slips:
 
     @cached_property
     def _torques(self) -> list[tuple[np.ndarray, np.ndarray]]:
-        """For each tick of a frame, torques at the samples of a stuck interval over the state at its begin, and over its reading."""
+        """Torques at the samples of a stuck interval over the state at its beginning, and over its reading, for each tick of a frame."""
         contact, found = self.contact, []
         for tick in range(contact.frame):
             matrix, constant = np.eye(self.n), np.zeros(self.n)
@@ -288,7 +288,7 @@ class Slips:
             known = low[at] + 1.0
 
     def _freed_at(self, pieces: Pieces) -> Pieces:
-        """With a torque that follows at once, a contact breaks away at the sample."""
+        """Frees contacts at the sample, where the torque follows at once."""
         contact = self.contact
         for way in (1, -1):
             high = along(way, *pieces.range_of(contact.held))[1]

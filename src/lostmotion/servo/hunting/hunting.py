@@ -131,7 +131,7 @@ def _found(train: Scenario) -> CycleSearch:
 
 
 def _multipliers(found: CycleSearch) -> np.ndarray:
-    """Without the one of the phase, nearest to 1."""
+    """The multipliers without the one of the phase, nearest to 1."""
     all_of_them = floquet_multipliers(found.result, 0)
     return np.delete(all_of_them, int(np.argmin(np.abs(all_of_them - 1.0))))
 
@@ -153,7 +153,7 @@ def _causes(train: Scenario, found: CycleSearch) -> tuple[str, ...]:
 
 
 def without_static_friction(train: Scenario) -> Scenario | None:
-    """With the friction in motion at rest, too; None where that changes nothing."""
+    """The scenario with the friction in motion at rest, too; None where that changes nothing."""
 
     def even(element: Any) -> dict[str, Any]:
         keys = ("breakaway_torque", "breakaway_force") if getattr(element, "stribeck_speed", None) is None else ()
@@ -163,7 +163,7 @@ def without_static_friction(train: Scenario) -> Scenario | None:
 
 
 def without_saturation(train: Scenario) -> Scenario | None:
-    """Without the limits of continuous controllers and of their motors; None where that changes nothing."""
+    """The scenario without the limits of continuous controllers and of their motors; None where that changes nothing."""
     controllers = {
         name: c.model_copy(update={"limit": None, "anti_windup_time": None}) for name, c in train.continuous().items()
     }
@@ -177,7 +177,7 @@ def without_saturation(train: Scenario) -> Scenario | None:
 
 
 def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
-    """By a long run, as the servo report has it."""
+    """The result of a long run, as the servo report has it."""
     from .limit_cycle_causes import limit_cycle as watched
 
     axis = axis_of(train, motor)

@@ -134,11 +134,11 @@ class WatchedRun:
 
     @property
     def elapsed(self) -> float:
-        """Since the inputs have come to rest [s]."""
+        """Time since the inputs have come to rest [s]."""
         return self.simulation.time - self.settled + self.skipped
 
     def _advance(self, interval: float) -> None:
-        """By a whole number of frames, at least one."""
+        """Advance by a whole number of frames, at least one."""
         if self.frame == 0.0:
             self.simulation.advance(interval, **self.inputs)
             return
@@ -241,7 +241,7 @@ class WatchedRun:
         return self._jump(looks, bend, min(windows, AHEAD), window)
 
     def _jump(self, looks: list[_Look], bend: np.ndarray, windows: int, window: float) -> bool:
-        """By so many windows, if the next one then goes as predicted."""
+        """Skip so many windows, if the next one then goes as predicted."""
         kept: SimulationState = self.simulation.state
         last = looks[-1].numbers - looks[-2].numbers
         self._set(looks[-1].numbers + windows * last + 0.5 * windows * (windows + 1) * bend)
@@ -257,7 +257,7 @@ class WatchedRun:
         return False
 
     def _set(self, numbers: np.ndarray) -> None:
-        """In the present modes."""
+        """Set the state, in the present modes."""
         now = self.core.get_state()
         v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
         new = {"state": v[:n], "memory": v[n:m], "course": [0.0] * len(now["course"])}
@@ -286,7 +286,7 @@ class WatchedRun:
         return float(np.mean(np.diff(self.rises())))
 
     def quick_frequency(self, variable: int, swing: float) -> float:
-        """By one sample each tick [Hz], since the samples of a long watch may be too far apart; NaN of a slower one."""
+        """Frequency from one sample each tick [Hz], since the samples of a long watch may be too far apart; NaN of a slower swing."""
         if self.frame == 0.0:
             return math.nan
         values = []
@@ -344,7 +344,7 @@ def rises_of(time: np.ndarray, values: np.ndarray) -> np.ndarray:
 
 
 def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
-    """By the upward crossings of the middle [Hz]; NaN where there are no two swings."""
+    """Frequency from the upward crossings of the middle [Hz]; NaN where there are no two swings."""
     rises = rises_of(time, values)
     return float((len(rises) - 1) / (rises[-1] - rises[0])) if len(rises) > 1 else math.nan
 

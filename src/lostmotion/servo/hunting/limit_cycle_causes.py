@@ -111,7 +111,7 @@ def _with(axis: Axis, scenario: Scenario | None) -> Axis | None:
 
 
 def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
-    """After the end of its reference; after a small step of the position where that never comes to rest, or never moves.
+    """The motion after the end of the reference; after a small step of the position where the reference never rests, or never moves.
 
     most: longest time to follow [s].
     """
@@ -142,7 +142,7 @@ def watched_at_least(axis: Axis) -> float:
 
 
 def without(scenario: Scenario, values_of: Callable[[Any], dict[str, Any]]) -> Scenario | None:
-    """With other values of elements, shafts and slides; None where that changes nothing."""
+    """The scenario with other values of elements, shafts and slides; None where that changes nothing."""
     new: dict[str, dict[str, Part]] = {}
     for table in ("shafts", "slides", *LinearElements.model_fields):
         elements = getattr(scenario, table)
@@ -153,7 +153,7 @@ def without(scenario: Scenario, values_of: Callable[[Any], dict[str, Any]]) -> S
 
 
 def without_backlash(scenario: Scenario) -> Scenario | None:
-    """With all gaps closed; None where there are none."""
+    """The scenario with all gaps closed; None where there are none."""
 
     def closed(element: Any) -> dict[str, Any]:
         if isinstance(element, LinearDrive):
@@ -165,7 +165,7 @@ def without_backlash(scenario: Scenario) -> Scenario | None:
 
 
 def without_friction(scenario: Scenario) -> Scenario | None:
-    """Without dry friction and hysteresis; None where there are none."""
+    """The scenario without dry friction and hysteresis; None where there are none."""
     none = dict.fromkeys(("friction_torque", "friction_force", "drag_torque"), 0.0) | dict.fromkeys(
         ("breakaway_torque", "breakaway_force", "stribeck_speed", "friction_curve", "friction_error", "hysteresis")
     )
@@ -178,7 +178,7 @@ def without_friction(scenario: Scenario) -> Scenario | None:
 
 
 def without_steps(axis: Axis) -> Axis | None:
-    """With encoders of no resolution; None where they have none."""
+    """The axis with encoders without steps; None where they have none."""
     fields = {}
     for key in ("encoder", "position_encoder"):
         encoder = getattr(axis.controller, key)

@@ -88,7 +88,7 @@ class UndrivenLoop:
         return cls(core, core_case(scenario), constants, settled, watched, channels, scenario)
 
     def run(self, duration: float, samples: int) -> dict[str, Any]:
-        """From the start."""
+        """A run from the start."""
         grid: dict[str, Any] = {"duration": duration, "sample_interval": duration / samples, "samples": samples}
         return _core.run(self.case, **grid, max_switchings=MAX_SWITCHINGS)
 

@@ -84,7 +84,7 @@ def map_without_steps(contact: SampledSlip, errors: np.ndarray) -> np.ndarray:
 
 
 def _share(contact: SampledSlip, largest: float) -> Proof:
-    """Without steps and excess, all is in proportion to the error."""
+    """Proof without steps and excess, where all is in proportion to the error."""
     try:
         least, most = end_of_slip(contact, 1.0, 1.0, parts=PARTS)
     except UndecidableError as why:
@@ -96,7 +96,7 @@ def _share(contact: SampledSlip, largest: float) -> Proof:
 
 
 def _last_readings(slips: Slips) -> Proof:
-    """From as many of the readings next to the reference as can be followed."""
+    """Proof from as many of the readings next to the reference as can be followed."""
     found = _by_readings(slips, 1, 1)
     for high in range(2, LAST + 1):
         if found.verdict != "does not hunt" or (more := _by_readings(slips, 1, high)).verdict == "not decided":
@@ -142,7 +142,7 @@ def _decided(contact: SampledSlip, left: dict[int, set[int]]) -> Proof:
 
 
 def _about_orbit(slips: Slips) -> Proof:
-    """About the readings that slips from the smallest error lead to."""
+    """Proof about the readings that slips from the smallest error lead to."""
     counts = [1]
     for _ in range(ORBIT):
         try:

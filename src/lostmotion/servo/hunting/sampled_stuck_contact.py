@@ -75,7 +75,7 @@ class SampledSlip:
 
     @cached_property
     def linear(self) -> tuple[np.ndarray, ...]:
-        """For each tick of a frame, matrix of the state with an encoder without steps."""
+        """Matrix of the state with an encoder without steps, for each tick of a frame."""
         return tuple(matrix + np.outer(column, self.reading) for matrix, column in self.samples)
 
     @property
@@ -100,7 +100,7 @@ class SettledStuckState:
 
     @classmethod
     def of(cls, slip: SampledSlip) -> SettledStuckState:
-        """By following the stuck interval, for ever twice as long.
+        """The settled state, found by following the stuck interval for ever twice as long.
 
         Raises AtRestError: nothing winds up.
         Raises UndecidableError: it does not settle, or winds up otherwise than in proportion to the error.

@@ -136,7 +136,7 @@ class BoxFollower:
         self._stopped: dict[tuple[Any, ...], tuple[np.ndarray, np.ndarray]] = {}
 
     def follow(self, boxes: Boxes, phase: int) -> Settled:
-        """From states after the sample at a tick of the frame.
+        """Follow states after the sample at a tick of the frame.
 
         Raises UndecidableError: the boxes become too many, or a limit of the controller may act.
         """
@@ -262,7 +262,7 @@ class BoxFollower:
         return boxes, low
 
     def _freed(self, boxes: Boxes) -> Boxes:
-        """With a torque that follows at once, a contact breaks away at the sample."""
+        """Frees contacts at the sample, where the torque follows at once."""
         contact = self.contact
         for way in (1, -1):
             low, high = along(way, *boxes.range_of(contact.held))

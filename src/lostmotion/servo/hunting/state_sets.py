@@ -35,7 +35,7 @@ class Sets:
 
     @classmethod
     def joined(cls, parts: Sequence[Self]) -> Self:
-        """All of them together."""
+        """The sets of several parts as one."""
         parts = [part for part in parts if len(part)] or parts[:1]
         if len(parts) == 1:
             return parts[0]
@@ -79,7 +79,7 @@ def one_way(sets: Sets, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, 
 
 
 def bend_of(contact: SampledSlip, sets: Any, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> np.ndarray:
-    """By how much the speed may be below that at both ends of a tick: with a torque that is held it has its least value at one.
+    """Largest amount by which the speed within a tick is below its least value at the ends; 0 where the torque is held.
 
     noise: largest effect of readings on an output, beside what is in the sets.
     """

@@ -165,7 +165,7 @@ def _core_of(scenario: Scenario) -> _core.Train:
 
 
 def _error(scenario: Scenario, tuned: Scenario) -> str:
-    """What keeps the core from stepping a train, or nothing."""
+    """The reason why the core cannot step a train, or nothing."""
     return _core.DriveBatch.error(_core_of(scenario), control_of(tuned))
 
 

@@ -66,7 +66,7 @@ def _axis_back() -> Iterator[tuple[str, str]]:
 
 
 def _first_of(keys: Iterable[tuple[str, str]]) -> dict[str, str]:
-    """For each key of files, the first key of the long form that it stands for."""
+    """First key of the long form for each key of files."""
     first: dict[str, str] = {}
     for long, short in keys:
         first.setdefault(short, long)

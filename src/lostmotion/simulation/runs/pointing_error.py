@@ -1,4 +1,4 @@
-"""By how much controlled axes miss their references."""
+"""Errors of controlled axes against their references."""
 
 from __future__ import annotations
 

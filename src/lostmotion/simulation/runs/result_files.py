@@ -177,7 +177,7 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
 
 
 def _header(dataset: xarray.Dataset) -> str:
-    """All but the samples, as JSON: attributes, how many samples there are, and the switchings by columns."""
+    """The attributes, number of samples and switchings by columns, as JSON."""
     attributes = {k: v for k, v in dataset.attrs.items() if k != SWITCHINGS}
     header = {"attributes": attributes, "samples": dataset.sizes["time"]}
     if SWITCHINGS in dataset.attrs:

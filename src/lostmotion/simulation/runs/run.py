@@ -220,7 +220,7 @@ def run(
 
 
 def _warned(scenario: Scenario, result: RunArrays) -> RunArrays:
-    """With what is to be said of the sampling of its currents."""
+    """The result with a warning on the sampling of its currents."""
     text = too_slow(scenario, result.values)
     return replace(result, attrs=warned(result.attrs, text)) if text else result
 

@@ -168,7 +168,7 @@ def joined_results(
 def _joined_switchings(
     contacts: Sequence[str], rows: dict[str, np.ndarray], results: Sequence[dict[str, Any]]
 ) -> np.ndarray:
-    """In the order of time; the contacts of the other parts are as their own last switching has left them."""
+    """The switchings in the order of time; contacts of the other parts are as their own last switching has left them."""
     n = len(contacts)
     count = sum(len(r["switchings"]) for r in results)
     table = np.full((count, LEADING + 2 * n), np.nan)

@@ -47,7 +47,7 @@ def coarser(control: BoundController) -> BoundController:
 
 
 def error_bound(scenario: Scenario, fine: Mapping[str, Any], coarse: Mapping[str, Any]) -> dict[str, float]:
-    """By how much the variables of the motors may be wrong, from a run with one exchange in each tick and one with two.
+    """Bound on the error of the motors' variables, from a run with one exchange in each tick and one with two.
 
     The error of the second is a sixteenth of the difference if nothing switches, and a quarter if the torque jumps.
     The bound is the difference itself, plus the remainder of the passes.

@@ -468,7 +468,7 @@ class Scenario:
             return core_control(self.train(), self.axes(), laws)
 
     def signals(self) -> dict[str, Signal[Any]]:
-        """All that acts on the train, after delays of brakes and clutches, by the name of its result variable."""
+        """Signals that act on the train, after delays of brakes and clutches, by the name of the result variable."""
         train, controllers = self.train(), self.continuous()
         commands = {
             train.variable(name, "command"): stepper_fields.acting(self.tables, name)

@@ -98,7 +98,7 @@ class JointDrive:
         return total
 
     def twists_under(self, torque: float) -> tuple[dict[str, float], dict[str, float]]:
-        """By gear: the twists [rad] under a torque [N·m] on the joint, and the hysteresis capacities [N·m] that such a torque leaves.
+        """The twists [rad] by gear under a torque [N·m] on the joint, and the hysteresis capacities [N·m] that such a torque leaves.
 
         Gears hand the torque on without losses: at rest the share that each of them carries is not determined.
 
@@ -243,13 +243,13 @@ class JointTrains:
             robot.advance_under(self._core, interval=interval, substeps=substeps, force=force, out=self._values)
 
     def go_back(self) -> None:
-        """To where the last step began."""
+        """Return to the beginning of the last step."""
         self._core.go_back()
         self.read()
 
     @property
     def guesses(self) -> list[tuple[float, float]]:
-        """By joint: load torque [N·m] and mean acceleration [rad/s²] of the last substep, where the next begins its search."""
+        """Load torque [N·m] and mean acceleration [rad/s²] of the last substep, by joint; the next search begins there."""
         return list(self._core.guesses())
 
     @guesses.setter

@@ -188,7 +188,7 @@ class Simulation(SimulationAnswers):
         self._only: dict[str, str] = {}  # what `advance` calls so
 
     def __reduce__(self) -> tuple[Any, ...]:
-        """For copies, which go on by themselves from the present state, and for pickling."""
+        """Supports copies, which go on by themselves from the present state, and pickling."""
         own = {name: value for name, value in vars(self).items() if not name.startswith("_")}  # of a subclass
         return _remade, (type(self), self._made, self._sines, self._initial, self.state), own
 
@@ -352,7 +352,7 @@ class Simulation(SimulationAnswers):
             raise
 
     def _step_with_motions(self, interval: Any, begin: list[float], end: list[float], motion: Any) -> None:
-        """In parts, such that all accelerations are straight lines in each part; in one part if no motion is given."""
+        """Step in parts, such that all accelerations are straight lines in each part; in one part if no motion is given."""
         if not motion and not self._motions:
             self._step(interval, begin, end)
             return
@@ -484,7 +484,7 @@ def _remade(kind: Any, made: Mapping[str, Any], sines: Any, initial: Any, state:
 
 
 class _Coarser(Simulation):
-    """With one exchange of torque and speed in each tick."""
+    """Simulation with one exchange of torque and speed in each tick."""
 
     @staticmethod
     def _exchanging(control: BoundController) -> BoundController:

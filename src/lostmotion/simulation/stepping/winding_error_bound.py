@@ -23,7 +23,7 @@ class StepBound:
         self.forget()
 
     def forget(self) -> None:
-        """At t = 0."""
+        """Start again at t = 0."""
         self._largest = dict.fromkeys(self._names, 0.0)
         self._apart = dict.fromkeys(self._names, 0.0)
 
@@ -35,7 +35,7 @@ class StepBound:
             self._apart[name] = max(self._apart[name], abs(here - there))
 
     def bounds(self) -> dict[str, float]:
-        """By variable."""
+        """The bounds by variable."""
         return bounds_of(self._names, self._largest, self._apart)
 
     @property

@@ -208,7 +208,7 @@ def tuned(base: Scenario, motor: Motor, g: Gearbox, current: AnyCurrent | None =
 
 
 def torque_limit(motor: Motor) -> float | None:
-    """By the largest current, or the peak torque if that is less [N·m]; None where neither is given."""
+    """Torque at the largest current, or the peak torque if that is less [N·m]; None where neither is given."""
     limits, found = motor.limits, [motor.largest_torque]
     if limits is not None and limits.peak_torque is not None:
         found.append(limits.peak_torque)

@@ -91,12 +91,12 @@ TOGETHER = 8  # sample times whose heat is taken as even
 
 
 def rms(values: np.ndarray) -> float:
-    """Over a cycle, whose last sample is the first of the next."""
+    """Root mean square over a cycle, whose last sample is the first of the next."""
     return float(np.sqrt(np.mean(values[:-1] ** 2)))
 
 
 def change(result: RunArrays, count: int) -> float:
-    """By how much the last two cycles differ in rms torque and rms twist, and in the mean distance from the reference."""
+    """Difference of the last two cycles in rms torque, rms twist, and mean distance from the reference."""
     last, before = (last_cycle(len(result.time), count, back) for back in (1, 2))
     found = 0.0
     for name in ("motor_torque", "twist", "load_speed"):

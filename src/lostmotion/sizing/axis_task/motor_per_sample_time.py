@@ -18,7 +18,7 @@ from ..thermal import mean_square
 
 @dataclass(frozen=True)
 class Electrical:
-    """Over the samples of one cycle, one in each sample time, both ends included, or over the times between them."""
+    """Electrical quantities over the samples of one cycle, one in each sample time, both ends included, or over the times between them."""
 
     current: np.ndarray  # at the samples [A]; of a synchronous motor amplitude of a phase
     voltage: np.ndarray  # the same [V]

@@ -82,7 +82,7 @@ class Expression:
                     self.reduction = reduction, variable
 
     def values(self, names: Names, runs: int) -> np.ndarray:
-        """For each run of several, shape (runs,), from variables (run, time) and what is of the run alone."""
+        """Values for each of several runs, shape (runs,), from variables (run, time) and values of the runs."""
         with np.errstate(all="ignore"):
             value = self._term.value(names)
         return np.broadcast_to(np.asarray(value, dtype=float), (runs,))

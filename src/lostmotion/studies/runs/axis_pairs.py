@@ -345,7 +345,7 @@ class Axes:
         return found
 
     def violated(self, row: np.ndarray) -> tuple[str, ...]:
-        """All limits that a pair violates, of the rules and of the selection; it is run if the rules pass."""
+        """Limits that a pair violates, of the rules and of the selection; the pair is run if the rules pass."""
         refused = self.refused(row)
         if refused is not None:
             return tuple(str(refused["violated"]).split())

@@ -13,7 +13,7 @@ if TYPE_CHECKING:
 
 
 def read_table(directory: Path) -> pa.Table:
-    """All rows that are there, in the order of the runs. Raises InputError: there are none, or a part is damaged."""
+    """The table of all rows that are there, in the order of the runs. Raises InputError: there are none, or a part is damaged."""
     import pyarrow.dataset as ds
 
     files = _whole_parts(directory)

@@ -65,7 +65,7 @@ def _keys(study: Study) -> list[tuple[str, str, Vary]]:
 
 
 def run_in_core(study: Study, parameters: np.ndarray, threads: int) -> Runs:
-    """All runs in one call, the GIL released."""
+    """Simulate all runs in one call, with the GIL released."""
     n, sampled, reduced = len(parameters), channels(study), reductions(study)
     entries = study.vocabulary.energies if asks_for(study, "energy") else ()
     errors, cases, fields, values = (_by_numbers if core_can(study) else _one_by_one)(study, parameters)
@@ -159,7 +159,7 @@ def _with_derived(
 
 
 def _out_of_range(study: Study, parameters: np.ndarray) -> list[str]:
-    """For each run, why it is no valid scenario; empty if it is.
+    """Reason why each run is no valid scenario; empty if it is valid.
 
     The range of each number is an interval. So if the least and the largest value are valid, all are. A run is
     checked by itself only if they are not.

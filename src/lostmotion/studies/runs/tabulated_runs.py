@@ -68,7 +68,7 @@ def _instants(duration: float, interval: float) -> Any:
 
 
 def _names(study: Study, runs: Runs, threads: int) -> dict[str, Any]:
-    """All that the study's expressions may use, over all runs of a piece."""
+    """Values that the study's expressions may use, over all runs of a piece."""
     import xarray as xr
 
     def each_run(values: np.ndarray) -> xr.DataArray:

@@ -64,7 +64,7 @@ def misses(study: Study, ranked: list[RankedCandidate], count: int) -> list[Miss
 
 
 def _lacks(candidate: RankedCandidate) -> dict[str, float]:
-    """By limit, by how much it is exceeded; empty if one of these is not a number."""
+    """Excess of each exceeded limit; empty if one of these is not a number."""
     never = WINDOW in candidate.over
     limits = [WINDOW if never and limit == "settling_time" else limit for limit in candidate.violated]
     return {x: candidate.over[x] for x in limits} if all(x in candidate.over for x in limits) else {}
@@ -133,7 +133,7 @@ def _slowed_signal(signal: Any, factor: float) -> Any:
 
 
 def _tried(study: Study, miss: Miss) -> Miss:
-    """With the least factor by which the cycle has to be longer, if there is one, and the findings of rules and run with it."""
+    """The miss with the least factor by which the cycle has to be longer, if there is one, and the findings of rules and run with it."""
     if same := dict.fromkeys("its parts" if limit in CHOICE else limit for limit in miss.lacks if limit in AT_ANY_TIME):
         return replace(miss, then=f"a slower cycle does not change {', '.join(same)}")
     try:
@@ -152,8 +152,8 @@ def _tried(study: Study, miss: Miss) -> Miss:
 
 
 def _run_slower(study: Study, miss: Miss, row: np.ndarray, least: float = 1.0) -> Miss:
-    """With the first of some factors above the `least` whose run fits: errors of runs need not fall steadily with the time, so that
-    none is sought between."""
+    """The miss with the first of some factors above the `least` whose run fits: errors of runs need not fall steadily
+    with the time, so that none is sought between."""
     near = (
         [1.0 + share * miss.worst for share in NEAR if share * miss.worst < TRIES[0] - 1.0]
         if miss.candidate.ran

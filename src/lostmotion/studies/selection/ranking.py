@@ -159,7 +159,7 @@ def _beyond(column: str, row: dict[str, Any], bound: tuple[float, float], study:
 
 
 def _excess(column: str, value: float, low: float, high: float) -> dict[str, float]:
-    """By how much a value is beyond its bounds, as a share of the one that it violates."""
+    """Distance of a value beyond its bounds, as a share of the violated bound."""
     bound = high if value > high else low
     share = abs(value - bound) / abs(bound) if bound != 0.0 else math.inf
     return {column: share} if math.isfinite(share) else {}

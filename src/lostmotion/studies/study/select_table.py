@@ -26,7 +26,7 @@ class Selection(Part):
     drive_check: Switch = True  #: each run must also pass the drive check
 
     def named(self) -> tuple[str, ...]:
-        """All columns that it names."""
+        """Columns that the table names."""
         return (*self.objectives, *self.limits)
 
     def direction(self, column: str) -> float:

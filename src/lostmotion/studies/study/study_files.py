@@ -92,6 +92,6 @@ def from_json(text: str) -> Study:
 
 
 def to_json(study: Study) -> str:
-    """All of a study, the base scenario included."""
+    """The study as JSON, with its base scenario."""
     text = study.model_dump_json(exclude_none=True)
     return f'{text.removesuffix("}")},"in_axis_form":true}}' if study.scenario.form == AXIS else text
