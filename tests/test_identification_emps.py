@@ -23,15 +23,17 @@ EMPS = ROOT / "examples" / "emps"
 DATA = os.environ.get("LOSTMOTION_EMPS", "")
 NAMES = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")
 
-# Found from the first log by `lostmotion identify examples/emps/identify.toml`, on its highest rung.
+# Found from the first log by `lostmotion identify examples/emps/identify.toml`, and of each log its speed at the start and
+# its friction over that of the parameters.
 FOUND = {
-    "mass": 92.09004922667978,
-    "viscous_friction": 218.9226246646427,
-    "coulomb_friction": 18.516185048428788,
-    "offset": -3.415248632363271,
-    "static_friction": 16.58528561081367,
-    "friction_speed": 0.01885073266082816,
+    "mass": 93.24449587115448,
+    "viscous_friction": 163.16559915968273,
+    "coulomb_friction": 20.272898414122203,
+    "offset": 0.14704673026126677,
+    "backward": 1.5144008578125436,
 }
+OF_LOGS = ({"first_speed": -0.007815879454219351, "friction_factor": 1.0008387785777562},
+           {"first_speed": 0.0025916091334879632, "friction_factor": 1.0293237824831094})  # fmt: skip
 # Of the description of the data, from inverse dynamics; the speed at which both logs begin is from the position.
 PUBLISHED = {"mass": 95.1089, "viscous_friction": 203.5034, "coulomb_friction": 20.3935, "offset": -3.1648, "first_speed": 0.0079}
 
@@ -65,20 +67,31 @@ def test_the_regression_of_inverse_dynamics_is_that_of_the_description() -> None
 
 @needs_data
 def test_the_axis_follows_its_voltage_in_open_loop() -> None:
-    """25 s without any feedback; the best linear model of the benchmark reaches a fit of 25.4 %, a plain four-parameter drive 6.98 mm."""
+    """25 s without any feedback; a plain four-parameter drive leaves 6.98 mm, a neural network of the benchmark 2.64 mm.
+
+    Of the log that was held out, friction and speed at the start are its own. With the friction of the first log, which is 2.9 %
+    less, 13 mm are left.
+    """
     rig, logs = rig_and_logs("identify.toml")
-    rmse = [float(np.sqrt(np.mean((log.measured["position"] - run_log(rig, log, FOUND, 2)["position"]) ** 2))) for log in logs]
+
+    def rmse(k: int, own: dict[str, float]) -> float:
+        run = run_log(rig, logs[k], {**FOUND, **own}, 1)
+        return float(np.sqrt(np.mean((logs[k].measured["position"] - run["position"]) ** 2)))
+
     # As measured when these values were found, to the last figure given.
-    assert rmse == pytest.approx([2.2621e-3, 4.2617e-3], abs=1e-5)
+    assert [rmse(k, own) for k, own in enumerate(OF_LOGS)] == pytest.approx([1.5694e-3, 0.9456e-3], abs=1e-6)
+    assert rmse(1, OF_LOGS[1] | {"friction_factor": OF_LOGS[0]["friction_factor"]}) == pytest.approx(13.07e-3, abs=1e-5)
     assert [log.held_out for log in logs] == [False, True]
 
 
 @needs_data
-def test_the_rung_that_is_taken_is_nearer_than_a_drive_of_four_parameters() -> None:
+def test_friction_that_differs_by_direction_is_found() -> None:
+    """Inverse dynamics by numpy, with the central differences of the description, give 164 and 237 N s/m: 1.45 times as much."""
     rig, logs = rig_and_logs("identify.toml")
     result = identify_logs(rig, logs)
-    assert result.chosen > 0
-    assert result.error("position", held_out=True)[1] < 4.8e-3  # RMSE [m]
+    assert result.chosen == 1
+    assert result.error("position", held_out=True)[1] < 2.6e-3  # RMSE [m]
+    assert result.intervals["backward"].low < 1.45 < result.intervals["backward"].high
 
 
 @needs_data
@@ -102,4 +115,4 @@ def test_the_examples_read(file: str) -> None:
     rig = Rig(task, directory)
     header = {"gtau": 35.15, "kp": 160.18, "kv": 243.45, "first_qm": 0.0, "first_speed": 0.0}
     for k in range(len(task.rungs())):
-        rig.built(rig.changes({**header, **{n: p.start for n, p in task.parameters.items()}}, k, -1))
+        rig.built(rig.changes({**header, **{n: p.start for n, p in (task.parameters | task.nuisance).items()}}, k, -1))

@@ -150,6 +150,17 @@ DISC: dict[str, Any] = {
 }
 
 
+@pytest.mark.parametrize(("speed", "friction"), [(60.0, 0.02), (-60.0, 0.03)])
+def test_a_drag_that_differs_by_direction_slows_the_shaft_down_as_its_side_does(speed: float, friction: float) -> None:
+    """J w' = -b w, with 1.5 times the viscous friction backward: w = w_0 exp(-b t/J)."""
+    drag = {"kind": "curve", "speeds": [0.0, 100.0], "torques": [0.0, 2.0], "backward": 1.5}
+    data = DISC | {"initial": {"speeds": {"disc": speed}}, "simulation": {"duration": 0.5, "sample_interval": 0.05}}
+    result = lm.simulate(lm.Scenario(shafts={"disc": {"inertia": 0.01, "drag": drag}}, **data))
+    assert result["disc_speed"].values == pytest.approx(speed * np.exp(-friction * result["time"].values / 0.01), rel=1e-12)
+    lost = 0.5 * 0.01 * (speed**2 - float(result["disc_speed"][-1]) ** 2)
+    assert lm.energy_of(result)["disc: drag"] == pytest.approx(lost, rel=1e-9)
+
+
 def test_a_falling_drag_curve_holds_its_last_torque() -> None:
     """From 120 rad/s at a constant 12.3 N m to 80 rad/s at t = 40/12.3 s, then along the curve, by scipy."""
     speeds, torques = [0, 5, 10, 20, 40, 80], [0, 40, 50, 40, 23.5, 12.3]

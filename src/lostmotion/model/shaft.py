@@ -10,7 +10,7 @@ from .. import _core
 from ..inputs import core_parameters
 from ..inputs.breakpoints import check_apart
 from ..inputs.part import Part
-from ..inputs.quantities import NotNegative, Positive, Speed, Torque
+from ..inputs.quantities import NotNegative, Number, Positive, Speed, Torque
 from .end_stops import ShaftEndStops
 
 SHARE = _core.USUAL_ERROR
@@ -68,6 +68,8 @@ class DragCurve(Part):
     """the first is 0: what holds at rest is friction"""
     beyond: Literal["extend", "hold"] = "extend"
     """beyond the last point: the last line goes on, or the last torque stays"""
+    backward: Annotated[Number, Positive] = 1.0
+    """torque at negative speeds over that at positive ones"""
     kind: Literal["curve"] = "curve"
 
     @model_validator(mode="after")
@@ -86,9 +88,12 @@ class DragCurve(Part):
     def core(self) -> _core.TorsionCurve:
         points = list(zip(self.speeds, self.torques, strict=True))
         slopes = [(T2 - T1) / (w2 - w1) for (w1, T1), (w2, T2) in itertools.pairwise(points)]
+        speeds = list(self.speeds[1:-1])
         if self.beyond == "hold":
-            return _core.TorsionCurve(list(self.speeds[1:]), [*slopes, 0.0])
-        return _core.TorsionCurve(list(self.speeds[1:-1]), slopes)
+            speeds, slopes = list(self.speeds[1:]), [*slopes, 0.0]
+        if self.backward == 1.0:
+            return _core.TorsionCurve(speeds, slopes)
+        return _core.TorsionCurve({"slopes": slopes, "breaks": speeds, "backward": self.backward})
 
 
 class QuadraticDrag(core_parameters.QuadraticDragFields):
