@@ -318,6 +318,7 @@ def test_the_run_takes_about_what_the_rules_require(task: Study, result: Any):
         found = input_demand(motion, task.part("gearbox", parameters))
         rms = found.cycle(found.motor_torque(task.part("motor", parameters))).rms_motor_torque
         assert float(row["motor_torque_rms"]) == pytest.approx(rms, rel=0.1)
+        assert float(row["required_torque_rms"]) == rms
 
 
 def test_refused_pairs_say_why(result: Any):
@@ -326,6 +327,7 @@ def test_refused_pairs_say_why(result: Any):
     for k in range(refused.sizes["pair"]):
         assert not bool(refused["fits"][k])
         assert str(refused["violated"].values[k])
+        assert float(refused["required_torque_peak"][k]) == float(refused["motor_torque_peak"][k])
         assert "exceeds" in str(refused["why"].values[k]) or "above" in str(refused["why"].values[k])
 
 

@@ -237,10 +237,19 @@ class Axes:
         """The columns that need no run."""
         known = {column: value for column, (value, _) in self.choice(row).items()}
         gearbox, motor = self.gearbox(row), self.motor(row)
-        if isinstance(gearbox, InputError) or isinstance(motor, InputError) or self.study.slides_itself(row):
+        if isinstance(gearbox, InputError) or isinstance(motor, InputError):
             return known
-        ratio = ratio_of_inertias(motor, gearbox[0].whole, float(self.motion(row).inertia.max()))
-        return known | {"inertia_ratio": ratio}
+        slides, torque = self.study.slides_itself(row), gearbox[0].motor_torque(motor)
+        required = f"required_{'force' if slides else 'torque'}"
+        known |= {
+            f"{required}_peak": float(np.abs(torque).max()),
+            f"{required}_rms": gearbox[0].cycle(torque).rms_motor_torque,
+        }
+        if slides:
+            return known
+        return known | {
+            "inertia_ratio": ratio_of_inertias(motor, gearbox[0].whole, float(self.motion(row).inertia.max()))
+        }
 
     def _chosen(self, row: np.ndarray, findings: list[Finding]) -> tuple[list[Finding], list[str]]:
         """Findings with the findings on the limits of the choice, and the data that the records lack for limits and objectives."""
@@ -300,19 +309,15 @@ class Axes:
             return CHECKS | {"violated": NO_DATA, "why": str(found), MISSING: lacking}
         if not any(f.verdict == "warning" for f in found):
             return None
-        return columns_of(found, CHECKS) | self._without_run(row) | self._required(row)
-
-    def _required(self, row: np.ndarray) -> ResultRow:
-        """The columns of a pair that is not run, for the motion that the task requires."""
+        required = self._without_run(row)
+        of_motor = {
+            name.replace("required", "motor"): required[name] for name in required if name.startswith("required_")
+        }
         gearbox, motor = self.gearbox(row), self.motor(row)
-        if isinstance(gearbox, InputError) or isinstance(motor, InputError):
-            return {}
-        torque = gearbox[0].motor_torque(motor)
-        cycle = gearbox[0].cycle(torque)
-        slides = self.study.slides_itself(row)
-        of_motor, peak = f"motor_{'force' if slides else 'torque'}", float(np.abs(torque).max())
-        found = {f"{of_motor}_peak": peak, f"{of_motor}_rms": cycle.rms_motor_torque}
-        return found if slides else found | columns_of_gearbox(cycle)
+        if isinstance(gearbox, InputError) or isinstance(motor, InputError) or self.study.slides_itself(row):
+            return columns_of(found, CHECKS) | required | of_motor
+        of_gearbox = columns_of_gearbox(gearbox[0].cycle(gearbox[0].motor_torque(motor)))
+        return columns_of(found, CHECKS) | required | of_motor | of_gearbox
 
     def verdict_at_ends(self, row: np.ndarray, own: tuple[str, ...]) -> str:
         """Verdict over the range of estimated losses; empty where the losses are printed.
