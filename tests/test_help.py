@@ -51,7 +51,11 @@ def can_run(words: list[str]) -> bool:
 
 
 @pytest.mark.parametrize("name", COMMANDS, ids=" ".join)
-def test_the_help_of_a_command_has_an_example_that_runs(name: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_help_of_a_command_begins_with_what_it_is_for_and_an_example_that_runs(
+    name: tuple[str, ...], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    first, _, _, example, *_ = inspect.cleandoc(COMMANDS[name].help).splitlines()
+    assert first.startswith("To ") and can_run(shlex.split(example.partition(" > ")[0])[1:])
     examples = [words for words in examples_of(COMMANDS[name]) if can_run(words)]
     if name == ("study",):
         examples = [words for words in examples if "show" not in words and "resume" not in words]

@@ -35,9 +35,7 @@ def catalogue(
     every: Annotated[bool, typer.Option("--all", help="List all that fit, not only a screen of them.")] = False,
     output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
 ) -> None:
-    """List components, show one, or write a data sheet template.
-
-    Without an option: how many records of each kind there are. The list has a column with the level of the model, or the missing data.
+    """To find a gearbox, motor or screw, or to write your data sheet.
 
     \b
     lostmotion catalogue --kind strain_wave --ratio 50..120 --torque 20..100
@@ -45,6 +43,8 @@ def catalogue(
     lostmotion catalogue new -o my-gearbox.toml
     lostmotion catalogue --kind screw --lead "5 mm..10 mm" --force 10000..20000
     lostmotion catalogue new --kind screw -o my-screw.toml
+
+    Without an option: how many records of each kind there are. The list has a column with the level of the model, or the missing data.
     """
     from ..reports.listing import list_records, record_text, summary, template
 

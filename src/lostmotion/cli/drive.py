@@ -19,16 +19,16 @@ def check(
         Path | None, typer.Option("-o", "--report", metavar="FILE", help="Also write the findings as a page: .html.")
     ] = None,
 ) -> None:
-    """Check torques, speeds, heat, resonance and holding.
+    """To see whether a drive fits its task: torques, speeds, heat.
+
+    \b
+    lostmotion check catalogue-robot-joint --report check.html
+    lostmotion check drive.toml --set task.cycle="2 s"
 
     Also checks voltage, current, inertia ratio, dead zone, lost motion and self-locking.
 
     The check of a drive train covers torques, speeds, voltage, current, heat and self-locking of each gear and motor. Warnings and the
     page name the source of each rule. The table [task] of the scenario gives the duty cycle and requirements.
-
-    \b
-    lostmotion check drive.toml --set task.cycle="2 s"
-    lostmotion check catalogue-robot-joint --report check.html
     """
     from ..reports.drive_check import check_report
     from ..sizing.drive_check import check_drive

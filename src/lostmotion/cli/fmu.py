@@ -52,17 +52,17 @@ def fmu(
         ),
     ] = None,
 ) -> None:
-    """Write a scenario as an FMU for Simulink and other tools.
+    """To use a drive in Simulink and other tools: write an FMU.
+
+    \b
+    lostmotion fmu position-axis -o axis.fmu --fmi 3 --set load.inertia="3 kg*m^2"
+    lostmotion fmu drive.toml -o drive.fmu
+    lostmotion fmu position-axis -o axis.fmu --source
+    lostmotion fmu given-motion -o crank.fmu --motion-inputs crank
 
     An FMU is for Co-Simulation and Model Exchange.
 
     Inputs are commands, load torques and references of continuous controllers. Each follows its signal in the scenario until the importer sets it. Outputs are the result variables; parameters have the keys of the scenario file.
-
-    \b
-    lostmotion fmu drive.toml -o drive.fmu
-    lostmotion fmu position-axis -o axis.fmu --fmi 3 --set load.inertia="3 kg*m^2"
-    lostmotion fmu position-axis -o axis.fmu --source
-    lostmotion fmu given-motion -o crank.fmu --motion-inputs crank
     """
     from ..errors import InputError
     from ..portable.fmu import export_fmu

@@ -51,7 +51,11 @@ def identify(
     ] = False,
     figures: FiguresOption = None,
 ) -> None:
-    """Identify a drive from measured logs.
+    """To get the parameters of a real drive from measured logs.
+
+    \b
+    lostmotion identify examples/cycloidal/baseline.toml -o identified
+    lostmotion identify new servo/logs --rig servo.toml
 
     Prints values, intervals, unidentifiable parameters and dropped parts of logs. With -o, writes identified.toml (the rig with the identified values, a
     scenario), identified.html (one page), errors.csv (of each log), parameters.csv and, with the key record, gearbox.toml (a data
@@ -62,10 +66,6 @@ def identify(
 
     `new` looks at the logs in DIR and writes a first identification file: channels, units, sample times, and what is in doubt about
     them. Without --rig it also writes rig.toml, a template of the rig. A file that exists is never overwritten.
-
-    \b
-    lostmotion identify new servo/logs --rig servo.toml
-    lostmotion identify examples/cycloidal/baseline.toml -o identified
     """
     if str(file) == "new":
         _new(directory, rig, output)
@@ -148,12 +148,12 @@ def _print_summary(result: IdentificationResult) -> None:
     print(result.task.title or "Identification")
     print(result.verdict)
     print(*(f"  {text}" for text in result.warnings()), sep="\n", end="\n" if result.warnings() else "")
-    unit = f" {result.error_unit}".rstrip()
+    name, factor = result.error_unit()
+    unit = f" {name}".rstrip()
     for k, rung in enumerate(result.rungs):
-        held_out = "" if math.isnan(rung.held_out) else f", held out {rung.held_out:.4g}{unit}"
-        print(
-            f"  {'*' if k == result.chosen else ' '} {rung.name}: mean absolute error {rung.train:.4g}{unit}{held_out}"
-        )
+        held_out = "" if math.isnan(rung.held_out) else f", held out {factor * rung.held_out:.4g}{unit}"
+        fitted = f"mean absolute error {factor * rung.train:.4g}{unit}"
+        print(f"  {'*' if k == result.chosen else ' '} {rung.name}: {fitted}{held_out}")
     print(*result.lines()[len(result.warnings()) :], sep="\n")
     if result.left_out:
         print(

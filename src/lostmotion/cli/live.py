@@ -20,13 +20,13 @@ def live(
     overrides: Overrides = None,
     show: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
 ) -> None:
-    """Write a drive as a page with sliders for the browser.
-
-    The page solves the drive itself, by the same core as here; it needs no server and no network, and can be sent to others.
+    """To try values by sliders: write a page that solves the drive.
 
     \b
     lostmotion live paper-2dof-nl-small
     lostmotion live drive.toml --set load.inertia="3 kg*m^2" -o drive.html --no-open
+
+    The page solves the drive itself, by the same core as here; it needs no server and no network, and can be sent to others.
     """
     from ..errors import InputError
     from ..live_page.page import write_page

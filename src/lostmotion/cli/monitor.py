@@ -23,17 +23,17 @@ def monitor(
     output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Follow the wear of a drive from operation logs.
+    """To follow the wear of a drive from operation logs.
+
+    \b
+    lostmotion monitor examples/wear/monitor.toml -o monitored
+    lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
 
     Estimates backlash, friction, stiffness and losses over the life of the drive.
 
     Prints the findings; with -o, writes monitor.html (one page), values.csv (each log) and watched.csv (trends, changes, limits).
     Does not fit, exit code 1: a value has changed or is beyond its limit. Not decided, exit code 3: too few logs, or an interval
     that contains the limit.
-
-    \b
-    lostmotion monitor joint.toml logs/2026-*.csv -o joint-7
-    lostmotion monitor examples/wear/monitor.toml -o monitored
     """
     pictures = pictures_of(figures, output)
     from ..identification.monitor.monitor import monitor as run

@@ -8,15 +8,15 @@ from .terminal import progress
 
 
 def reproduce(output: ReportOption = None, figures: FiguresOption = None) -> None:
-    """Reproduce the paper: its figures, data and deviations.
+    """To check the solver against the paper: figures and deviations.
+
+    \b
+    lostmotion reproduce -o out
 
     The paper is "Simplified dynamic model of the transmission".
 
     Prints the main results. With -o, writes report.html (a single self-contained page), the data of its figures as CSV, and the
     constants as constants.csv.
-
-    \b
-    lostmotion reproduce -o out
     """
     from ..errors import need
 

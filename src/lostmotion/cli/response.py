@@ -60,17 +60,17 @@ def response(
     output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Compute the frequency response over amplitude.
+    """To see bandwidth and dead zone over the amplitude of motion.
+
+    \b
+    lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 --refine 0.2 -o bode
+    lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
 
     Each point is computed from a periodic motion, on all cores.
 
     The scenario gives the drive or train, its controllers and the constant parts of the inputs. Prints bandwidth and dead zone. With
     -o, writes response.html (gain and phase, maps of gain, phase, efficiency and distortion over amplitude and frequency) and all
     numbers (bode.csv, response.csv, characteristics.csv, and response.nc where NetCDF is installed).
-
-    \b
-    lostmotion response paper-2dof-nl-small --amplitudes 0.025,1 --frequencies 1..30:12 --refine 0.2 -o bode
-    lostmotion response drive.toml --compare linear.toml --refine 0.5 -o bode
     """
     pictures = pictures_of(figures, output)
     files = _titles(scenario, compare or ())

@@ -53,15 +53,15 @@ def rig(
     ] = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Measure a gearbox or screw on the virtual test rig.
-
-    Prints the comparison with its data sheet; with -o, writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
+    """To see what a gearbox or screw does, beside its data sheet.
 
     \b
     lostmotion rig schaeffler-rt1-h-20-100
     lostmotion rig my-gearbox.toml -o rig --set loss_factor=1.3
     lostmotion rig rexroth-25x10rx3-i4 --set "supported_length=600 mm"
     lostmotion rig my-gearbox.toml --logs campaign --ripple "2 0.02 N*m"
+
+    Prints the comparison with its data sheet; with -o, writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
     """
     from ..data_sheets.linear_sheets import ScrewSheet
     from ..data_sheets.records import find_one_of

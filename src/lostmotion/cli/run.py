@@ -71,18 +71,18 @@ def run(
         ),
     ] = None,
 ) -> None:
-    """Run a scenario: print, save, draw, report, explain.
-
-    With a controller the summary has the following error, true and as it is measured. A loop does not fit if it is
-    unstable: its error grows, or it has a pole outside the unit circle. Swings of a stable loop are a reservation.
+    """To see how a drive moves: run it, plot it, explain it.
 
     \b
-    lostmotion run drive.toml
     lostmotion run paper-2dof-nl-small --plot small.png
+    lostmotion run drive.toml
     lostmotion run paper-2dof-nl-small --plot energy.png --figure energy
     lostmotion run position-axis --report axis.html
     lostmotion run drive.toml --set command.amplitude=0.1 -o result.csv --plot result.png
     lostmotion run result.csv --explain 0.25
+
+    With a controller the summary has the following error, true and as it is measured. A loop does not fit if it is
+    unstable: its error grows, or it has a pole outside the unit circle. Swings of a stable loop are a reservation.
     """
     from ..errors import InputError
 

@@ -11,12 +11,12 @@ from .arguments import SourceArgument
 
 
 def scenarios() -> None:
-    """List the shipped scenarios.
-
-    All commands take their names in place of a file.
+    """To find a scenario to start from: list those that are shipped.
 
     \b
     lostmotion scenarios
+
+    All commands take their names in place of a file.
     """
     from ..inputs.toml_files import read_toml
     from ..simulation.scenario.shipped_scenarios import shipped_scenarios
@@ -34,7 +34,7 @@ def new(
     scenario: SourceArgument,
     output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The copy.")],
 ) -> None:
-    """Copy a shipped scenario, with its comments, to change it.
+    """To start a file of your own: copy a shipped one with comments.
 
     \b
     lostmotion new position-axis -o my.toml
@@ -61,12 +61,12 @@ def new(
 
 
 def schema() -> None:
-    """Print the JSON Schema of scenario files.
-
-    Editors complete and check scenario files of drives and of drive trains with it.
+    """To let an editor check scenarios: print their JSON Schema.
 
     \b
     lostmotion schema > scenario.schema.json
+
+    Editors complete and check scenario files of drives and of drive trains with it.
     """
     import json
 

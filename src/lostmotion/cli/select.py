@@ -19,16 +19,16 @@ def select(
     processes: ProcessesOption = None,
     scheduler: SchedulerOption = None,
 ) -> None:
-    """Choose motor and gearbox for a task.
+    """To choose motor and gearbox for a task.
+
+    \b
+    lostmotion select examples/select-axis.toml -o axis
 
     Judges each pair by the manufacturers' rules, and tunes and simulates those that pass.
 
     The task file has the motion, the load and what is wanted; motors and gearboxes are all of the catalogue, or those that it
     names. Prints the ranking and the reasons for refusal. The runs are kept in the directory given by -o, and an interrupted
     command resumes there. `lostmotion study show DIR -o REPORT` writes a page with the Pareto front.
-
-    \b
-    lostmotion select examples/select-axis.toml -o axis
     """
     from ..studies.selection.task_file import load_task
 

@@ -109,18 +109,18 @@ def servo(
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Commission a servo axis: margins, steps, limit cycles.
+    """To commission a servo axis: gains, margins, settling, hunting.
+
+    \b
+    lostmotion servo position-axis -o servo
+    lostmotion servo position-axis --tune margins --feedforward -o tuned.toml
+    lostmotion servo position-axis --tune margins --phase-margin "45 deg" --gain-margin "8 dB"
 
     Also computes bandwidths, following error, settling and stiffness.
 
     The report is servo.html (one page) with the data of its charts and the margins as CSV. The verdict is on stability, the
     window, hunting and limits; what was asked for is written whatever it is. With a continuous controller it is the certificate of
     hunting.
-
-    \b
-    lostmotion servo position-axis -o servo
-    lostmotion servo position-axis --tune margins --feedforward -o tuned.toml
-    lostmotion servo position-axis --tune margins --phase-margin "45 deg" --gain-margin "8 dB"
     """
     from ..errors import InputError
     from ..reports.pictures import endings

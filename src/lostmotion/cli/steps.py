@@ -34,14 +34,14 @@ def steps(
         Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the curves: .png, .svg or .pdf.")
     ] = None,
 ) -> None:
-    """Print the torques of a stepper over its step rate.
-
-    Pull-out and pull-in torque follow from the data, and from runs with the axis as it is. The swing of the rotor in its field shows
-    the step rates at which steps meet a resonance.
+    """To see how fast a stepper may step: torques over the step rate.
 
     \b
     lostmotion steps stepper-belt-axis --rates 200.0,1000.0
     lostmotion steps printer.toml --rates 100..10000:20 -o curves.csv --plot curves.png
+
+    Pull-out and pull-in torque follow from the data, and from runs with the axis as it is. The swing of the rotor in its field shows
+    the step rates at which steps meet a resonance.
     """
     from ..atomic_writer import write_whole
     from ..reports.stepper_curves import as_csv, charts, table

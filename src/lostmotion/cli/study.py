@@ -51,16 +51,16 @@ def study(
     repair: Annotated[bool, typer.Option("--repair", help="Make damaged parts of the directory again.")] = False,
     figures: FiguresOption = None,
 ) -> None:
-    """Run many variants: vary parameters, store results, resume.
-
-    The directory given by -o holds Parquet files, one row a run, that pandas, DuckDB and polars open directly. Prints a summary.
-    Failed runs have their reasons in the column error, and the exit code is 1. A study with a table [select] has a verdict.
-    `show` prints the summary of a directory; with -o, it writes study.html (one page) and its tables into another one.
+    """To see what tolerances do: run many variants of a scenario.
 
     \b
     lostmotion study examples/tolerance.toml -o tolerance
     lostmotion study show tolerance --best peak_load_speed -o report
     lostmotion study resume tolerance --repair
+
+    The directory given by -o holds Parquet files, one row a run, that pandas, DuckDB and polars open directly. Prints a summary.
+    Failed runs have their reasons in the column error, and the exit code is 1. A study with a table [select] has a verdict. `show` prints the summary of a directory; with -o,
+    it writes study.html (one page) and its tables into another one.
     """
     from ..errors import InputError
 

@@ -57,14 +57,14 @@ def track(
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:
-    """Compute pointing errors and the contribution of each cause.
-
-    Prints the errors; with -o, writes track.html (one page) and its data as CSV. The page has the errors over time
-    and over the speed of the target, their contributions, and the influence of wrong losses, temperature and wear.
+    """To see how well an axis points, and what limits it.
 
     \b
     lostmotion track tracking-loss-map --limit "motor=10 urad"
     lostmotion track axes.toml --view "traverse=6.65 deg" --view "elevation=5.27 deg" -o track
+
+    Prints the errors; with -o, writes track.html (one page) and its data as CSV. The page has the errors over time
+    and over the speed of the target, their contributions, and the influence of wrong losses, temperature and wear.
     """
     from ..errors import InputError
     from ..reports.pointing import verdict_of
