@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from pathlib import Path
 from typing import Any
 
@@ -75,7 +76,10 @@ def test_the_error_of_a_condition_left_out_is_that_of_the_closed_form(folders: P
     for name in ("arm = 1", "arm = 2"):  # both arms have both masses, so that nothing changes
         assert found[name].left_out == pytest.approx(found[name].fitted, rel=1e-6)
     lines = [line for line in result.lines() if "when fitted without them" in line]
-    assert len(lines) == 4 and f"folder = heavy (2 logs): mean absolute error {found['folder = heavy'].fitted:.4g} rad" in lines[0]
+    assert (
+        len(lines) == 4
+        and f"folder = heavy (2 logs): mean absolute error {math.degrees(found['folder = heavy'].fitted):.4g} deg" in lines[0]
+    )
     table = next(part for part in identification_report("x", result).parts if "Leave one" in getattr(part, "title", ""))
     assert [row[0] for row in table.rows] == list(found)
     assert 90.0 < result.values["mass"] < 125.0  # of the fit to all, which stays

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import re
 from pathlib import Path
 
@@ -47,10 +48,10 @@ def test_errors_are_of_the_logs_that_they_name_with_units_and_all_channels(tmp_p
     for text in (result.source(), write_identification(tmp_path / "out", "axis", result).read_text()):
         assert what in text and "other logs" not in text
         errors = text[text.index(what) :]
-        position = re.search(r"position MAE \S+ rad, RMSE (\S+) rad;", errors)
+        position = re.search(r"position MAE \S+ deg, RMSE (\S+) deg;", errors)
         speed = re.search(r"speed MAE \S+ rad/s, RMSE (\S+) rad/s", errors)
         assert position is not None and speed is not None
-        assert float(position[1]) == pytest.approx(POSITION_NOISE, rel=0.07)
+        assert math.radians(float(position[1])) == pytest.approx(POSITION_NOISE, rel=0.07)
         assert float(speed[1]) == pytest.approx(SPEED_NOISE, rel=0.07)
 
 
@@ -60,7 +61,7 @@ def test_tables_of_errors_name_their_units(tmp_path: Path) -> None:
     assert "mean absolute error, fitted [standard deviations]" in page
     heading, first, second, *_ = (tmp_path / "out" / "errors.csv").read_text().splitlines()
     assert heading.endswith(",unit of MAE and RMSE") and first.endswith(",rad") and second.endswith(",rad/s")
-    assert "position [rad]" in (tmp_path / "out" / "overlays.csv").read_text()
+    assert "position [deg]" in (tmp_path / "out" / "overlays.csv").read_text()
     assert "position, 2 logs fitted: MAE" in str(result) and re.search(r"RMSE \S+ rad/s", str(result))
 
 

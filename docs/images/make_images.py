@@ -49,7 +49,7 @@ def selection(study: lm.studies.Study, name: str) -> None:
     with tempfile.TemporaryDirectory() as directory:
         table = read_table(lm.study(study, Path(directory) / "selection"))
     ranked = candidates(table, study)
-    figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study.select)
+    figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study)
     figure.savefig(HERE / name, dpi=110, metadata={"Software": None})
 
 

@@ -43,15 +43,17 @@ class ConditionError:
         shown = f"{self.value:g}" if isinstance(self.value, float) else shortened(str(self.value))
         return f"{self.key} = {shown}"
 
-    def text(self, unit: str) -> str:
+    def text(self, unit: str, factor: float) -> str:
         """One line.
 
-        unit: of the errors.
+        unit: in which errors are printed.
+
+        factor: how many of them one SI unit is.
         """
         unit = f" {unit}".rstrip()
-        without = self.failed or f"{self.left_out:.4g}{unit} when fitted without them"
+        without = self.failed or f"{factor * self.left_out:.4g}{unit} when fitted without them"
         logs = f"{self.logs} log{'' if self.logs == 1 else 's'}"
-        return f"{self.name} ({logs}): mean absolute error {self.fitted:.4g}{unit}, {without}"
+        return f"{self.name} ({logs}): mean absolute error {factor * self.fitted:.4g}{unit}, {without}"
 
 
 def left_out_errors(

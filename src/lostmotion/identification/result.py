@@ -24,6 +24,7 @@ from .verdicts.identifiability import Undetermined
 from .verdicts.residual_tests import Misfit
 from .verdicts.shared_faults import KindError, SharedFault
 
+SHOWN = {"rad": ("deg", math.degrees(1.0)), "m": ("mm", 1e3)}  # units in which errors are printed, by SI unit
 HALF = 0.5  # of the standard deviation of what was measured: a model that leaves more does not describe the motion
 
 
@@ -95,11 +96,13 @@ class IdentificationResult:
         """SI unit of the errors of a channel; empty where neither its file nor the rig gives one."""
         return next((log.log.channels[self.task.measured[channel].channel].unit for log in self.logs), "")
 
-    @property
-    def error_unit(self) -> str:
-        """Unit of the errors by which models are compared."""
+    def error_unit(self, channel: str | None = None) -> tuple[str, float]:
+        """Unit in which errors of a channel are printed, and how many of them one SI unit is; left out, of those that compare models."""
         first, *more = self.task.measured
-        return "standard deviations" if more else self.unit(first)
+        if channel is None and more:
+            return "standard deviations", 1.0
+        unit = self.unit(channel or first)
+        return SHOWN.get(unit, (unit, 1.0))
 
     def errors_text(self, *, held_out: bool) -> str:
         """MAE and RMSE of each channel that has errors, with its unit."""
@@ -108,8 +111,9 @@ class IdentificationResult:
 
     def _error_text(self, channel: str, *, held_out: bool) -> str:
         mae, rmse = self.error(channel, held_out=held_out)
-        unit = f" {self.unit(channel)}".rstrip()
-        return "" if math.isnan(mae) else f"MAE {mae:.4g}{unit}, RMSE {rmse:.4g}{unit}"
+        unit, factor = self.error_unit(channel)
+        shown = [f"{name} {factor * value:.4g} {unit}".rstrip() for name, value in (("MAE", mae), ("RMSE", rmse))]
+        return "" if math.isnan(mae) else ", ".join(shown)
 
     def values_for(self, log: str) -> dict[str, float]:
         """Values of all parameters, and of the nuisances of one log by its name."""
@@ -137,7 +141,7 @@ class IdentificationResult:
                 if text := self._error_text(channel, held_out=held_out):
                     own = [e for e in self.errors if e.held_out == held_out and e.channel == channel]
                     lines.append(f"  {channel}, {_logs(sum(not math.isnan(e.mae) for e in own))} {what}: {text}")
-        lines += [f"  {condition.text(self.error_unit)}" for condition in self.conditions]
+        lines += [f"  {condition.text(*self.error_unit())}" for condition in self.conditions]
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.inputs, *self.starts()]]
 
@@ -153,7 +157,7 @@ class IdentificationResult:
         return [
             *(s.text for s in self.shared),
             *odd,
-            *(m.text(self.unit(m.channel)) for m in self.misfits),
+            *(m.text(*self.error_unit(m.channel)) for m in self.misfits),
             *(f"{name} {text}" for name in lost),
         ]
 
@@ -173,9 +177,11 @@ class IdentificationResult:
                 sum(e.samples * (e.rmse / max(1.0 - e.fit, 1e-12)) ** 2 for e in mine if e.fit == e.fit)
                 / sum(e.samples for e in mine)
             )
-            sizes.append(f"{channel} fits to {_sized(rms, self.unit(channel))} rms{' held out' if held_out else ''}")
+            sizes.append(
+                f"{channel} fits to {_sized(rms, *self.error_unit(channel))} rms{' held out' if held_out else ''}"
+            )
             if rms > HALF * spread:
-                text = f"{channel}: an error of {_sized(rms, self.unit(channel))} rms is left of a motion of {_sized(spread, self.unit(channel))} rms"
+                text = f"{channel}: an error of {_sized(rms, *self.error_unit(channel))} rms is left of a motion of {_sized(spread, *self.error_unit(channel))} rms"
                 points.append(Point("does not fit", text))
         fits = "; ".join(sizes)
         loose = {name for u in self.undetermined for name in u.changes} | {
@@ -276,8 +282,6 @@ def _logs(count: int) -> str:
     return f"{count} log{'' if count == 1 else 's'}"
 
 
-def _sized(value: float, unit: str) -> str:
-    """An error with its unit; angles in degrees."""
-    if unit == "rad":
-        return f"{math.degrees(value):.2g} degrees"
-    return f"{value:.3g} {unit}".rstrip()
+def _sized(value: float, unit: str, factor: float) -> str:
+    """An error with its unit."""
+    return f"{factor * value:.3g} {'degrees' if unit == 'deg' else unit}".rstrip()

@@ -74,8 +74,8 @@ def write_identification(
 def identification_report(name: str, result: IdentificationResult, *, all_logs: bool = False) -> Report:
     """The page of an identification; of many logs it shows the worst, median and best, or on request all."""
     main, *groups = _groups(result, {} if all_logs else _chosen_logs(result))
-    unit = f" [{result.error_unit}]" if result.error_unit else ""
-    rungs = [[r.name, f"{r.train:.5g}", _held_out(r)] for r in result.rungs]
+    unit, factor = _bracketed(result)
+    rungs = [[r.name, f"{factor * r.train:.5g}", _held_out(r, factor)] for r in result.rungs]
     left_out = [list(pair) for pair in result.left_out.items()]
     notes = [[log, line] for log, lines in result.notes.items() for line in lines]
     lists = {
@@ -106,7 +106,7 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
             Table(
                 "Errors of each log",
                 HEADER,
-                error_rows(result),
+                error_rows(result, shown=True),
                 "MAE: mean absolute error. RMSE: root mean square error. Fit: 1 - RMSE/standard deviation of the measured values.",
             ),
             *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
@@ -123,24 +123,30 @@ INTERVALS = (
 )
 
 
-def error_rows(result: IdentificationResult) -> list[list[str]]:
-    """Errors of each log and channel, as text."""
-    return [
-        [
-            e.log,
-            e.channel,
-            "held out" if e.held_out else "fitted",
-            *(["no run", "", ""] if math.isnan(e.mae) else [f"{e.mae:.6g}", f"{e.rmse:.6g}", f"{100 * e.fit:.4g}"]),
-            result.unit(e.channel),
-        ]
-        for e in result.errors
-    ]
+def error_rows(result: IdentificationResult, *, shown: bool = False) -> list[list[str]]:
+    """Errors of each log and channel as text, in SI or as they are shown."""
+    rows = []
+    for e in result.errors:
+        unit, factor = result.error_unit(e.channel) if shown else (result.unit(e.channel), 1.0)
+        sizes = [f"{factor * e.mae:.6g}", f"{factor * e.rmse:.6g}", f"{100 * e.fit:.4g}"]
+        part = "held out" if e.held_out else "fitted"
+        rows.append([e.log, e.channel, part, *(["no run", "", ""] if math.isnan(e.mae) else sizes), unit])
+    return rows
+
+
+def _bracketed(result: IdentificationResult, channel: str | None = None) -> tuple[str, float]:
+    """Unit of errors in brackets, and how many of them one SI unit is."""
+    unit, factor = result.error_unit(channel)
+    return f" [{printed(unit)}]" if unit else "", factor
 
 
 def _conditions(result: IdentificationResult) -> Table:
     """Errors of the logs of each condition, with and without them in the fit."""
-    unit = f" [{result.error_unit}]" if result.error_unit else ""
-    rows = [[c.name, str(c.logs), f"{c.fitted:.5g}", c.failed or f"{c.left_out:.5g}"] for c in result.conditions]
+    unit, factor = _bracketed(result)
+    rows = [
+        [c.name, str(c.logs), f"{factor * c.fitted:.5g}", c.failed or f"{factor * c.left_out:.5g}"]
+        for c in result.conditions
+    ]
     heading = ("condition", "logs", f"mean absolute error, fitted{unit}", f"fitted without them{unit}")
     return Table(
         "Leave one condition out", heading, rows, "For each condition the model is fitted again without its logs."
@@ -150,17 +156,17 @@ def _conditions(result: IdentificationResult) -> Table:
 def _kinds(result: IdentificationResult) -> Table:
     """Errors of the logs by the values of their headers."""
     channel = next(iter(result.task.measured))
-    unit = f" [{printed(result.unit(channel))}]" if result.unit(channel) else ""
-    rows = [[f"{k.key} = {k.value}", str(k.logs), f"{k.mae:.5g}", str(k.odd)] for k in result.kinds]
+    unit, factor = _bracketed(result, channel)
+    rows = [[f"{k.key} = {k.value}", str(k.logs), f"{factor * k.mae:.5g}", str(k.odd)] for k in result.kinds]
     heading = ("logs with", "number", f"mean absolute error of {channel}{unit}", "odd logs")
     return Table(
         "Errors by kind of log", heading, rows, "A kind with a far larger error shows an effect that the model lacks."
     )
 
 
-def _held_out(rung: RungResult) -> str:
+def _held_out(rung: RungResult, factor: float) -> str:
     """The error of the logs held out, and how many have none."""
-    error = "" if math.isnan(rung.held_out) else f"{rung.held_out:.5g}"
+    error = "" if math.isnan(rung.held_out) else f"{factor * rung.held_out:.5g}"
     return f"{error} ({len(rung.failed)} without a run)".strip() if rung.failed else error
 
 
@@ -250,7 +256,7 @@ def _variables(result: IdentificationResult) -> dict[str, str]:
         *shape_variables(result.rig).values(),
         *(name for name in units if name.endswith(("_twist", "_deflection"))),
     ]
-    return {name: f"{name} [{printed(units[name])}]" for name in names}
+    return {name: f"{name.replace('_', ' ')} [{printed(units[name])}]" for name in names}
 
 
 def _overlays(
@@ -269,8 +275,8 @@ def _overlays(
             "time [s]",
             _labelled(result, channel),
             (
-                Curve("measured", run["time"], run[f"measured {channel}"], MEASURED),
-                Curve("computed", run["time"], run[channel], look(1)),
+                Curve("measured", run["time"], result.error_unit(channel)[1] * run[f"measured {channel}"], MEASURED),
+                Curve("computed", run["time"], result.error_unit(channel)[1] * run[channel], look(1)),
             ),
             max_points=count,
         )
@@ -280,8 +286,7 @@ def _overlays(
 
 def _labelled(result: IdentificationResult, channel: str) -> str:
     """A channel with its unit."""
-    unit = result.unit(channel)
-    return f"{channel} [{printed(unit)}]" if unit else channel
+    return f"{channel}{_bracketed(result, channel)[0]}"
 
 
 def _clouds(
@@ -290,12 +295,13 @@ def _clouds(
     panels = []
     channel = next(iter(result.task.measured))
     residual = np.concatenate([run[f"measured {channel}"] - run[channel] for run in table.values()])
+    residual *= result.error_unit(channel)[1]
     step = max(1, len(residual) // MANY)
     for name, label in variables.items():
         x = np.concatenate([run[name] for run in table.values()])
         panels.append(
             Panel(
-                f"over {name}",
+                f"over {name.replace('_', ' ')}",
                 label,
                 f"residual of {_labelled(result, channel)}",
                 (Curve("residual", x[::step], residual[::step], CLOUD),),

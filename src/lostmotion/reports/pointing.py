@@ -69,7 +69,8 @@ def contribution_rows(budget: PointingBudget) -> list[list[str]]:
 
 def _share(part: float, whole: PointingError) -> list[str]:
     share = f"{100.0 * part / whole.rms**2 + 0.0:.2f}" if whole.rms > 0.0 else ""
-    return [f"{1e12 * part:.3g}", "0.00" if share == "-0.00" else share]
+    share = "0.00" if share == "-0.00" else share
+    return ["0" if share == "0.00" else f"{1e12 * part:.3g}", share]
 
 
 def view_line(budget: PointingBudget) -> str:

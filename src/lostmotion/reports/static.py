@@ -17,6 +17,7 @@ from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Pa
 from .thinning import simplified, thinned
 
 WIDTH, HEIGHT = 560.0, 240.0
+NARROW = 380.0  # width of bars and histograms, about that of a card in three columns and on a telephone
 LEFT, RIGHT, TOP, BOTTOM = 56.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
 CONSTANT = 1e-9  # relative differences up to which are rounding
@@ -87,22 +88,32 @@ def _scale(limits: tuple[float, float], begin: float, end: float, logarithmic: b
     return to
 
 
-def _frame(panel: Panel, x: tuple[float, float], y: tuple[float, float], to_x: Scale, to_y: Scale, log_y: bool) -> str:
+def _frame(
+    panel: Panel,
+    x: tuple[float, float],
+    y: tuple[float, float],
+    to_x: Scale,
+    to_y: Scale,
+    log_y: bool,
+    width: float = WIDTH,
+) -> str:
     """Grid, ticks and labels."""
     lines, texts = [], []
     for v in _logarithmic_ticks(*y) if log_y else ticks(*y, 5, "[deg" in panel.y_label):
         at = f"{float(to_y(v)):.1f}"
-        lines.append(f"M{LEFT} {at}H{WIDTH - RIGHT}")
+        lines.append(f"M{LEFT} {at}H{width - RIGHT}")
         texts.append(f'<text class="tick end" x="{LEFT - 5}" y="{at}" dy="4">{_shown(v)}</text>')
     places = [float(k) for k in range(len(panel.x_names))] if len(panel.x_names) <= NAMES else []
     for v in (
-        places if panel.x_names else (_logarithmic_ticks(*x) if panel.log_x else ticks(*x, 6, whole=panel.whole_x))
+        places
+        if panel.x_names
+        else (_logarithmic_ticks(*x) if panel.log_x else ticks(*x, 6 if width == WIDTH else 4, whole=panel.whole_x))
     ):
         at = f"{float(to_x(v)):.1f}"
         lines.append(f"M{at} {TOP}V{HEIGHT - BOTTOM}")
         name = panel.x_names[int(v)] if panel.x_names else _shown(v)
         texts.append(f'<text class="tick" x="{at}" y="{HEIGHT - BOTTOM + 14}">{escape(name)}</text>')
-    texts.append(f'<text class="tick end" x="{WIDTH - RIGHT}" y="{HEIGHT - 4}">{escape(panel.x_label)}</text>')
+    texts.append(f'<text class="tick end" x="{width - RIGHT}" y="{HEIGHT - 4}">{escape(panel.x_label)}</text>')
     texts.append(f'<text class="tick end" transform="translate(11 {TOP}) rotate(-90)">{escape(panel.y_label)}</text>')
     return f'<path class="axis" d="{"".join(lines)}" fill="none"/>{"".join(texts)}'
 
@@ -196,9 +207,10 @@ def _edges(middles: np.ndarray) -> list[float]:
     return [float(v) for v in (middles[0], *between, middles[-1])]
 
 
-def _svg(title: str, height: float, parts: Iterable[str]) -> str:
+def _svg(title: str, height: float, parts: Iterable[str], width: float = WIDTH) -> str:
     label = f' aria-label="{escape(title)}"' if title else ""
-    return f'<svg role="img"{label} viewBox="0 0 {WIDTH:g} {height:g}">{"".join(parts)}</svg>'
+    narrow = f' style="max-width: {1.4 * width:g}px"' if width < WIDTH else ""
+    return f'<svg role="img"{label}{narrow} viewBox="0 0 {width:g} {height:g}">{"".join(parts)}</svg>'
 
 
 def _curve(curve: Curve, to_x: Scale, to_y: Scale) -> str:
@@ -234,12 +246,12 @@ def _bars(bars: Bars) -> str:
     """The longest bar first."""
     order = sorted(bars.values, key=lambda name: -max(map(abs, bars.values[name])))
     limits = bars.x_range or extent([*bars.values.values(), [0.0]], False, 0.0)
-    left = min(0.55 * WIDTH, 14.0 + 6.6 * max(map(len, order), default=0))
-    to_x = _scale(limits, left, WIDTH - RIGHT, False)
+    left = min(0.5 * NARROW, 14.0 + 6.2 * max(map(len, order), default=0))
+    to_x = _scale(limits, left, NARROW - RIGHT, False)
     row = 24.0
     height = TOP + row * len(order) + BOTTOM
     parts = []
-    for v in ticks(*limits, 5):
+    for v in ticks(*limits, 4):
         at = float(to_x(v))
         parts.append(f'<path class="axis" d="M{at:.1f} {TOP}V{height - BOTTOM}"/>')
         parts.append(f'<text class="tick" x="{at:.1f}" y="{height - BOTTOM + 14}">{_shown(v)}</text>')
@@ -259,8 +271,8 @@ def _bars(bars: Bars) -> str:
     if bars.limit is not None:
         end = f"{float(to_x(bars.limit)):.1f}"
         parts.append(f'<path d="M{end} {TOP}V{height - BOTTOM}" stroke="var(--text)" stroke-dasharray="4 3"/>')
-    parts.append(f'<text class="tick end" x="{WIDTH - RIGHT}" y="{height - 4:g}">{escape(bars.label)}</text>')
-    return _svg(bars.title, height, parts)
+    parts.append(f'<text class="tick end" x="{NARROW - RIGHT}" y="{height - 4:g}">{escape(bars.label)}</text>')
+    return _svg(bars.title, height, parts, NARROW)
 
 
 def _histogram(chart: Histogram) -> str:
@@ -268,8 +280,8 @@ def _histogram(chart: Histogram) -> str:
     values = np.asarray(chart.values, float)
     counts, edges = np.histogram(values, bins=min(60, max(5, round(len(values) ** 0.5))))
     x, y = (float(edges[0]), float(edges[-1])), (0.0, 1.05 * float(counts.max()) or 1.0)
-    to_x, to_y = _scale(x, LEFT, WIDTH - RIGHT, False), _scale(y, HEIGHT - BOTTOM, TOP, False)
-    parts = [_frame(Panel("", chart.label, "runs", ()), x, y, to_x, to_y, False)]
+    to_x, to_y = _scale(x, LEFT, NARROW - RIGHT, False), _scale(y, HEIGHT - BOTTOM, TOP, False)
+    parts = [_frame(Panel("", chart.label, "runs", ()), x, y, to_x, to_y, False, NARROW)]
     for count, (a, b) in zip(counts.tolist(), pairwise(to_x(edges).tolist()), strict=True):
         at = float(to_y(count))
         box = f'x="{a:.1f}" y="{at:.1f}" width="{max(0.5, b - a - 0.7):.1f}" height="{HEIGHT - BOTTOM - at:.1f}"'
@@ -278,7 +290,7 @@ def _histogram(chart: Histogram) -> str:
         value = float(np.quantile(values, quantile))
         line = f'd="M{float(to_x(value)):.1f} {TOP}V{HEIGHT - BOTTOM}" stroke="var(--second)" stroke-width="1.5"'
         parts.append(f"<path {line}><title>{100 * quantile:g} %: {_shown(value)}</title></path>")
-    return _svg(chart.title, HEIGHT, parts)
+    return _svg(chart.title, HEIGHT, parts, NARROW)
 
 
 def _contacts(chart: Contacts) -> str:

@@ -19,13 +19,14 @@ from .looks import PALETTE
 from .page import Prose, Report, Table
 from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Histogram, Panel
-from .study_selection import show_selection
+from .study_selection import show_selection, shown_in, words
 
 if TYPE_CHECKING:
     import pyarrow as pa
 
 BLANK = "Over all runs. A blank cell means that no run has a value."
 MAX_POINTS = 5000  # of a scatter
+NAMES = 12  # along an axis
 POINTS: dict[str, Any] = {
     "color": PALETTE["first"],
     "linestyle": "none",
@@ -35,16 +36,22 @@ POINTS: dict[str, Any] = {
 }
 
 
-def statistics(table: pa.Table, study: Study) -> list[list[Any]]:
-    """Name, mean, standard deviation, least, 5 %, 50 %, 95 %, largest of each kept value."""
+def statistics(table: pa.Table, study: Study, *, page: bool | None = None) -> list[list[Any]]:
+    """Name, mean, standard deviation, least, 5 %, 50 %, 95 %, largest of each kept value.
+
+    page: as a page or as the terminal shows it; left out, in SI.
+    """
     rows = []
     for name in study.keep:
-        x = _finite(table, name)
+        label, factor = labelled(table, name), 1.0
+        if page is not None:
+            label, factor = shown_in(table, study, name, "" if page else name)
+        x = factor * _finite(table, name)
         if len(x) == 0:
-            rows.append([labelled(table, name), *[np.nan] * 7])
+            rows.append([label, *[np.nan] * 7])
             continue
         quantiles = np.quantile(x, [0.0, 0.05, 0.5, 0.95, 1.0]).tolist()
-        rows.append([labelled(table, name), float(x.mean()), float(x.std()), *quantiles])
+        rows.append([label, float(x.mean()), float(x.std()), *quantiles])
     return rows
 
 
@@ -129,19 +136,13 @@ def best_runs(table: pa.Table, name: str, count: int = 10, *, largest: bool = Fa
 # --- charts ---
 
 
-def _label(table: pa.Table, column: str) -> str:
-    """A column with its unit, as charts print it."""
-    return printed(labelled(table, column))
-
-
-def _words(name: str) -> str:
-    """A name as a title has it."""
-    return name.replace("_", " ").replace(".", " ")
-
-
 def distributions(table: pa.Table, study: Study) -> Group:
     """A histogram of each kept value."""
-    charts = [Histogram(_words(name), _label(table, name), x) for name in study.keep if len(x := _finite(table, name))]
+    charts = []
+    for name in study.keep:
+        label, factor = shown_in(table, study, name)
+        if len(x := _finite(table, name)):
+            charts.append(Histogram(words(name), label, factor * x))
     return Group("distributions", "Distributions", "", tuple(charts), 3 if len(charts) % 3 == 0 else 2)
 
 
@@ -149,28 +150,28 @@ def bars(name: str, title: str, values: dict[str, dict[str, Any]], label: str, s
     """Bars by parameter for each kept value, the longest on top (tornado); pairs as two bars."""
     limits = None if series else (-1.0, 1.0)
     charts = [
-        Bars(_words(kept), label, {p: v if isinstance(v, tuple) else (v,) for p, v in by.items()}, series, limits)
+        Bars(words(kept), label, {p: v if isinstance(v, tuple) else (v,) for p, v in by.items()}, series, limits)
         for kept, by in values.items()
     ]
     return Group(name, title, "", tuple(charts), 3 if len(charts) % 3 == 0 else min(2, len(charts)))
 
 
 def scatter(table: pa.Table, study: Study, max_columns: int = 6) -> Group:
-    """Kept values over parameters, at most six of each and 5000 points."""
-    keep, vary = list(study.keep)[:max_columns], study.vary[:max_columns]
+    """Kept values over parameters, at most six of each and 5000 points; many names are no axis."""
+    few = [v for v in study.vary if v.names is None or len(v.names) <= NAMES]
+    keep, vary = list(study.keep)[:max_columns], few[:max_columns]
     some = table.take(np.linspace(0, table.num_rows - 1, min(table.num_rows, MAX_POINTS)).astype(int))
     charts = []
     for name in keep:
+        along, factor = shown_in(table, study, name)
         for v in vary:
             x = some[v.title].to_pylist()
             places = [v.names.index(value) for value in x] if v.names is not None else x
-            curve = Curve("runs", np.asarray(places, float), some[name].to_numpy(), POINTS)
-            names = v.names if v.names is not None else ()
-            across, along = (_label(table, column) for column in (v.title, name))
-            charts.append(
-                Panel(f"{_words(name)} over {_words(v.title)}", across, along, (curve,), x_names=tuple(names))
-            )
-    return Group("scatter", "Values over parameters", "", tuple(charts), min(3, len(vary)))
+            curve = Curve("runs", np.asarray(places, float), factor * some[name].to_numpy(), POINTS)
+            across = printed(labelled(table, v.title))
+            title = f"{words(name)} over {words(v.title)}"
+            charts.append(Panel(title, across, along, (curve,), x_names=tuple(v.names or ())))
+    return Group("scatter", "Values over parameters", "", tuple(charts), max(1, min(3, len(vary))))
 
 
 # --- the page ---
@@ -190,8 +191,7 @@ def _counted(table: pa.Table, study: Study) -> str:
 def _task_page(study: Study, table: pa.Table, name: str) -> Report:
     """Page of a task: its ranking alone, since the varied values are names."""
     shown = show_selection(table, study)
-    main, *parts = shown.parts if isinstance(shown.parts[0], Group) else (Group("none", "", "", ()), *shown.parts)
-    assert isinstance(main, Group)
+    main, parts = _with_main(shown.parts)
     lead = f"Selection of motor and gearbox for the task `{name}`: {_counted(table, study)}."
     return Report(study.title or name, lead, shown.verdict, main, tuple(parts), FILE, shown.tables)
 
@@ -202,7 +202,7 @@ STATISTICS = ("mean", "std. dev.", "min", "5 %", "50 %", "95 %", "max")
 
 def _study_lines(study: Study, table: pa.Table, name: str) -> list[str]:
     """Statistics, failures, Sobol indices and selection as text."""
-    rows = statistics(table, study)
+    rows = statistics(table, study, page=False)
     lines = [study.title or name, f"  {_counted(table, study)}", *(f"    {line}" for line in _failures(table))]
     width = max(len(r[0]) for r in rows) + 2
     lines.append("  " + " " * width + "".join(h.rjust(12) for h in STATISTICS))
@@ -220,7 +220,8 @@ def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[f
 
 
 def _study_page(study: Study, table: pa.Table, name: str) -> Report:
-    rows, failures = statistics(table, study), _failures(table)
+    failures = _failures(table)
+    rows = statistics(table, study, page=True)
     shown = [[row[0], *("" if np.isnan(x) else f"{x:.5g}" for x in row[1:])] for row in rows]
     parts: list[Any] = [Table("Statistics", ("value", *STATISTICS), shown, BLANK)]
     ranks = influence(table, study) if _with_order(study) else {}
@@ -230,37 +231,44 @@ def _study_page(study: Study, table: pa.Table, name: str) -> Report:
         shares = {kept: {p: found[:2] for p, found in by.items()} for kept, by in indices.items()}
         parts.append(bars("sobol", "Sobol indices", shares, "Sobol index [-]", ("first order", "total")))
     parts.append(scatter(table, study))
-    tables = {"statistics.csv": table_csv(["value", *STATISTICS], rows)}
+    tables = {"statistics.csv": table_csv(["value", *STATISTICS], statistics(table, study))}
     if indices:
         head = ["value", "parameter", "first order", "total", "first order, 95 % ±", "total, 95 % ±"]
         tables["sobol.csv"] = table_csv(
             head, [[kept, p, *found] for kept, by in indices.items() for p, found in by.items()]
         )
-    verdict: Verdict | tuple[str, ...] = _result(table, study, ranks)
-    if study.select is not None:
+    main, verdict = distributions(table, study), _result(table, study, ranks)
+    if study.select is not None:  # its chart and its tables come before the spread of the values
         selected = show_selection(table, study)
         tables, verdict = tables | selected.tables, selected.verdict
-        parts = [*selected.parts, *parts]
+        parts = [*_with_main(selected.parts)[1], main, *parts]
+        main = _with_main(selected.parts)[0]
     if failures:
         parts.append(Prose("Runs that failed", failures, listed=True))
     lead = f"Study `{name}`: {_counted(table, study)}."
-    return Report(study.title or name, lead, verdict, distributions(table, study), tuple(parts), FILE, tables)
+    kept = [part for part in parts if not isinstance(part, Group) or part.charts]
+    return Report(study.title or name, lead, verdict, main, tuple(kept), FILE, tables)
 
 
-def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> tuple[str, ...]:
+def _with_main(parts: Sequence[Table | Group]) -> tuple[Group, Sequence[Table | Group]]:
+    """The chart of a selection, which may have none, and its other parts."""
+    first, *rest = parts
+    return (first, rest) if isinstance(first, Group) else (Group("none", "", "", ()), parts)
+
+
+def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Verdict | tuple[str, ...]:
     """The spread of the first values, and what they depend on most."""
     lines = []
     for name in list(study.keep)[:2]:
-        x = _finite(table, name)
+        label, factor = shown_in(table, study, name)
+        x = factor * _finite(table, name)
         if len(x) == 0:
-            lines.append(f"{labelled(table, name)}: no run has a value.")
+            lines.append(f"{label}: no run has a value.")
             continue
         low, high = np.quantile(x, [0.05, 0.95])
         most = max(ranks.get(name, {}).items(), key=lambda pair: abs(pair[1]), default=None)
         depends = f"; depends most on {most[0]} (rank correlation {most[1]:+.2f})" if most and most[1] else ""
-        lines.append(
-            f"{labelled(table, name)}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}."
-        )
+        lines.append(f"{label}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}.")
     return f"{_counted(table, study)}.", *lines
 
 

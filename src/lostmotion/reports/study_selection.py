@@ -34,6 +34,26 @@ RECORDS_LACK = "Not judged, since a record lacks what a run needs:"
 RULES_LACK = "Rules that are not judged, for want of a datum:"
 ALL = "on the page and in its selection.csv"
 MAX_ROWS = 25  # of a table on the page
+LARGE = {
+    "arcmin": (math.radians(10.0), "deg", math.degrees(1.0)),
+    "ms": (1.0, "s", 1.0),
+}  # above which SI value, what unit
+
+
+def words(name: str) -> str:
+    """The name of a column as text has it: `tracking_error_peak` is the largest tracking error."""
+    of = name.replace("_", " ").replace(".", " ")
+    return f"largest {of.removesuffix(' peak')}" if name.endswith("_peak") else of
+
+
+def shown_in(table: pa.Table, study: Study, column: str, title: str = "") -> tuple[str, float]:
+    """A column in words, or by another title, with its unit, and how many of these one SI unit is: of a selection, a practical unit."""
+    si, values = unit_of(table, column), np.abs(table[column].to_numpy().astype(float))
+    unit, factor = PRACTICAL.get(si, (printed(si), 1.0)) if study.select is not None else (printed(si), 1.0)
+    if unit in LARGE and np.nanmax(values, initial=0.0) > LARGE[unit][0]:
+        unit, factor = LARGE[unit][1:]
+    title = title or words(column)
+    return f"{title} [{unit}]" if unit not in ("", "1") else title, factor
 
 
 @dataclass(frozen=True)
@@ -69,24 +89,24 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     near = misses(study, ranked, NEAREST) if study.axis is not None else []
     unknown, rules = not_judged(ranked), rules_not_judged(ranked)
     told = _misses(near) if near else _misfits(ranked)
-    verdict = _verdict(table, ranked, costs, select, near)
+    verdict = _verdict(table, ranked, costs, study, near)
     lines = [
-        *_ranking(table, ranked, front, select),
-        *_costs(table, costs, objective),
+        *_ranking(table, ranked, front, study),
+        *_costs(table, costs, study),
         *told,
         *_unknown(unknown, RECORDS_LACK),
         *_unknown(rules, RULES_LACK),
         f"Verdict: {verdict}",
     ]
     several = len(select.objectives) > 1 and any(all(map(math.isfinite, c.values.values())) for c in ranked)
-    chart = [Group("pareto", "", PARETO, (pareto_panel(table, ranked, front, select),), 1)] if several else []
+    chart = [Group("pareto", "Candidates", PARETO, (pareto_panel(table, ranked, front, study),), 1)] if several else []
     return Shown(
         lines=lines,
         verdict=verdict,
         parts=(
             *chart,
-            *_ranking_tables(table, ranked, front, select),
-            *([_costs_table(table, costs, objective)] if costs else []),
+            *_ranking_tables(table, ranked, front, study),
+            *([_costs_table(table, costs, study)] if costs else []),
             *_miss_tables(near),
             *_misfit_tables(ranked),
             *_unknown_tables(unknown, "Not judged: data that are missing"),
@@ -97,7 +117,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
 
 
 def _verdict(
-    table: pa.Table, ranked: list[RankedCandidate], costs: list[Price], select: Selection, near: list[Miss]
+    table: pa.Table, ranked: list[RankedCandidate], costs: list[Price], study: Study, near: list[Miss]
 ) -> Verdict:
     """Whether a candidate fits.
 
@@ -110,13 +130,10 @@ def _verdict(
     open_ones = sum(c.open for c in ranked)
     count += f", {open_ones} cannot be judged" if open_ones else ""
     lines, points = list[str](), list[Point]()
-    objective, direction = next(iter(select.objectives.items()))
     if fitting:
         best = fitting[0]
-        tightest = f"; its most used limit: {best.tightest}" if best.tightest else ""
-        lines.append(
-            f"Best: {best.name}, {labelled(table, objective)} {best.values[objective]:.5g} ({direction}){tightest}."
-        )
+        tightest = f"; its most used limit: {words(best.tightest)}" if best.tightest else ""
+        lines.append(f"Best: {best.name}, {_with_value(table, study, best)}{tightest}.")
         if open_points := _reservations(best, fitting):
             points.append(Point("fits with a reservation", f"{count}; of the best one, {'; '.join(open_points)}"))
         points.append(Point("fits", count))
@@ -124,11 +141,11 @@ def _verdict(
         points.append(Point("not decided" if open_ones else "does not fit", count))
     if near and not fitting:
         lines.append(f"Nearest: {near[0].candidate.name}: {near[0]}.")
-        lines.append(f"The limit {costs[0].limit} excludes most: {costs[0].excludes}.")
+        lines.append(f"The limit {words(costs[0].limit)} excludes most: {costs[0].excludes}.")
     dear = [p for p in costs if math.isfinite(p.gain) and p.gain > 0.0]
     if dear:
         p = max(dear, key=lambda price: price.gain)
-        lines.append(f"Without the limit {p.limit} the best would be {100.0 * p.gain:.3g} % better.")
+        lines.append(f"Without the limit {words(p.limit)} the best would be {100.0 * p.gain:.3g} % better.")
     return Verdict.of(points, lines)
 
 
@@ -145,14 +162,29 @@ def _reservations(best: RankedCandidate, fitting: list[RankedCandidate]) -> list
     return out
 
 
+def _with_value(table: pa.Table, study: Study, candidate: RankedCandidate) -> str:
+    """What candidates are ranked by, and its value for one of them, such as ``energy 32.95 J``."""
+    label, factor = shown_in(table, study, objective := _objective(study))
+    name, _, unit = label.removesuffix("]").partition(" [")
+    return f"{name} {factor * candidate.values[objective]:.5g} {unit}".rstrip()
+
+
+def _objective(study: Study) -> str:
+    """What candidates are ranked by."""
+    assert study.select is not None
+    return next(iter(study.select.objectives))
+
+
 def _ranking_tables(
-    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
+    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], study: Study
 ) -> list[Table]:
+    select = study.select
+    assert select is not None
     fitting = [c for c in ranked if c.fits][:MAX_ROWS]
     if not fitting:
         return []
     numbers = {c.run: str(k) for k, c in enumerate(_in_order(front, select), 1)}
-    titles, factors = _objectives(table, select)
+    titles, factors = _objectives(table, study)
     beside = [name for name in CHOICE if name not in select.objectives and any(name in c.choice for c in fitting)]
     titles += [_choice_title(name) for name in beside]
     last = [ESTIMATED] if any(c.estimated for c in fitting) else []
@@ -162,8 +194,8 @@ def _ranking_tables(
             *(f"{factor * v:.5g}" for factor, v in zip(factors, c.values.values(), strict=True)),
             *(f"{c.choice[n] / CHOICE[n].shown[1]:.5g}" if n in c.choice else "" for n in beside),
             numbers.get(c.run, ""),
-            c.tightest,
-            c.not_judged,
+            words(c.tightest),
+            ", ".join(map(words, c.not_judged.split())),
             *([c.estimated] if last else []),
         ]
         for c in fitting
@@ -176,16 +208,16 @@ def _ranking_tables(
     return [Table("Candidates that fit", header, rows, note)]
 
 
-def _objectives(table: pa.Table, select: Selection) -> tuple[list[str], list[float]]:
+def _objectives(table: pa.Table, study: Study) -> tuple[list[str], list[float]]:
     """Titles of the columns of objectives with the unit that is shown, and how many of these one SI unit is."""
-    titles, factors = [], []
-    for column, direction in select.objectives.items():
-        si = unit_of(table, column)
-        unit, factor = PRACTICAL.get(si, (printed(si), 1.0))
-        shown = f" [{unit}]" if unit not in ("", "1") else ""
-        titles.append(f"{column.replace('_', ' ')}{shown}, {'lower' if direction == 'least' else 'higher'} is better")
-        factors.append(factor)
-    return titles, factors
+    assert study.select is not None
+    found = {column: shown_in(table, study, column) for column in study.select.objectives}
+    titles = [_better(title, study.select.objectives[column]) for column, (title, _) in found.items()]
+    return titles, [factor for _, factor in found.values()]
+
+
+def _better(title: str, direction: str) -> str:
+    return f"{title}, {'lower' if direction == 'least' else 'higher'} is better"
 
 
 def _estimated(candidate: RankedCandidate) -> str:
@@ -212,23 +244,16 @@ def _choice_title(column: str) -> str:
     return column.replace("_", " ") + (f" [{unit}]" if unit else "")
 
 
-def _costs_table(table: pa.Table, costs: list[Price], objective: str) -> Table:
-    rows = []
+def _costs_table(table: pa.Table, costs: list[Price], study: Study) -> Table:
+    rows, objective = [], _objective(study)
+    label, factor = shown_in(table, study, objective)
     for p in costs:
         found = p.best is not None and p.alone
         best = p.best.name if p.best is not None and p.alone else "not run" if p.alone else "nothing more fits"
-        value = f"{p.best.values[objective]:.5g}" if p.best is not None and found else ""
+        value = f"{factor * p.best.values[objective]:.5g}" if p.best is not None and found else ""
         gain = (f"{100.0 * p.gain:.3g} %" if p.gain > 0.0 else "as now") if found and math.isfinite(p.gain) else ""
-        rows.append([p.limit, str(p.excludes), str(p.alone), _share(p.opens), best, value, gain])
-    header = (
-        "limit",
-        "excludes",
-        "of these alone",
-        "relaxed by",
-        "best without it",
-        labelled(table, objective),
-        "better by",
-    )
+        rows.append([words(p.limit), str(p.excludes), str(p.alone), _share(p.opens), best, value, gain])
+    header = ("limit", "excludes", "of these alone", "relaxed by", "best without it", label, "better by")
     return Table("What each limit costs", header, rows)
 
 
@@ -242,14 +267,14 @@ def _misfit_tables(ranked: list[RankedCandidate]) -> list[Table]:
     ]
 
 
-def pareto_panel(
-    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
-) -> Panel:
+def pareto_panel(table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], study: Study) -> Panel:
     """The first two objectives of all runs: those that fit, those that do not, and the front of those that fit."""
-    x, y = list(select.objectives)[:2]
+    select = study.select
+    assert select is not None
+    shown = {name: shown_in(table, study, name) for name in list(select.objectives)[:2]}
 
     def curve(label: str, found: list[RankedCandidate], style: dict[str, Any]) -> Curve:
-        across, along = (np.array([c.values[name] for c in found]) for name in (x, y))
+        across, along = (factor * np.array([c.values[name] for c in found]) for name, (_, factor) in shown.items())
         return Curve(label, across, along, style, names=tuple(c.name for c in found))
 
     fits, fails = ([c for c in ranked if c.fits is wanted] for wanted in (True, False))
@@ -261,8 +286,7 @@ def pareto_panel(
             numbered=len(front) <= MAX_ROWS,
         ),
     )
-    better = {"least": "lower is better", "largest": "higher is better"}
-    label = [f"{labelled(table, name)}, {better[select.objectives[name]]}" for name in (x, y)]
+    label = [_better(title, select.objectives[name]) for name, (title, _) in shown.items()]
     return Panel("Objectives of all candidates", label[0], label[1], tuple(c for c in curves if len(c.x)))
 
 
@@ -272,13 +296,11 @@ def _in_order(front: list[RankedCandidate], select: Selection) -> list[RankedCan
     return sorted(front, key=lambda c: c.values[first])
 
 
-def pareto_figure(
-    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
-) -> Figure:
+def pareto_figure(table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], study: Study) -> Figure:
     """The picture of `pareto_panel`."""
     from . import plots
 
-    return plots.draw([pareto_panel(table, ranked, front, select)], 1, (6.4, 4.4))
+    return plots.draw([pareto_panel(table, ranked, front, study)], 1, (6.4, 4.4))
 
 
 def _selection_csv(table: pa.Table, study: Study, ranked: list[RankedCandidate], front: list[RankedCandidate]) -> str:
@@ -296,9 +318,9 @@ def _selection_csv(table: pa.Table, study: Study, ranked: list[RankedCandidate],
     return table_csv([*header, *(labelled(table, name) for name in names)], rows)
 
 
-def _ranking(
-    table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], select: Selection
-) -> list[str]:
+def _ranking(table: pa.Table, ranked: list[RankedCandidate], front: list[RankedCandidate], study: Study) -> list[str]:
+    select = study.select
+    assert select is not None
     fitting = [c for c in ranked if c.fits]
     failed = sum(NOT_RUN in c.violated for c in ranked)
     fit = "fits" if len(fitting) == 1 else "fit"
@@ -306,7 +328,7 @@ def _ranking(
     if not fitting:
         return lines
     width = max(len(c.name) for c in fitting[:MAX_LINES]) + 2
-    titles, factors = _objectives(table, select)
+    titles, factors = _objectives(table, study)
     columns = [max(12, len(title) + 2) for title in titles]
     lines.append(" " * (width + 2) + "".join(t.rjust(w) for t, w in zip(titles, columns, strict=True)))
     on_front = {c.run for c in front}
@@ -324,7 +346,7 @@ def _ranking(
     return lines
 
 
-def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
+def _costs(table: pa.Table, costs: list[Price], study: Study) -> list[str]:
     if not costs:
         return []
     width = max(len(p.limit) for p in costs) + 2
@@ -334,7 +356,7 @@ def _costs(table: pa.Table, costs: list[Price], objective: str) -> list[str]:
         if p.best is None and p.alone:
             best = "not run"
         if p.best is not None and p.alone:
-            best = f"{p.best.name}, {labelled(table, objective)} {p.best.values[objective]:.5g}"
+            best = f"{p.best.name}, {_with_value(table, study, p.best)}"
             if math.isfinite(p.gain):
                 best += f" ({100.0 * p.gain:.3g} % better)" if p.gain > 0.0 else " (as now)"
         if math.isfinite(p.rests):

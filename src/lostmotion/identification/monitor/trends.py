@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...units.practical import printed
 from ..fit.intervals import Interval
 from ..task.free_parameters import FreeParameter, in_unit
 from ..task.identification_file import Identification
@@ -155,7 +156,7 @@ class _Series:
         levels = [Interval(x.low, x.high, "logs") for x in change.present]
         now, level = change.present[0].value, levels[0]
         beyond, limits = _against_limits(name, p, watch, levels)
-        unit = f" {p.unit}" if p.unit else ""
+        unit = f" {printed(p.unit)}" if p.unit else ""
         shown = f"{p.shown(now)}{unit} ({p.shown(level.low)} to {p.shown(level.high)})"
         after = len(self.logs) - self.count
         enough = math.isfinite(change.detectable)
@@ -232,7 +233,7 @@ def _against_limits(name: str, p: FreeParameter, watch: Watch, levels: list[Inte
             continue
         past = [sign * ((i.low if sign > 0.0 else i.high) - limit) > 0.0 for i in levels]
         inside = sign * ((levels[0].high if sign > 0.0 else levels[0].low) - limit) < 0.0
-        shown = f"the {side} permitted value {p.shown(limit)}{f' {p.unit}' if p.unit else ''}"
+        shown = f"the {side} permitted value {p.shown(limit)}{f' {printed(p.unit)}' if p.unit else ''}"
         if len(past) == CONFIRMED and all(past):
             states.append(True)
             words += f"; beyond {shown}"

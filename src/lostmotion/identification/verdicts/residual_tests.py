@@ -48,14 +48,12 @@ class Misfit:
         """Whether the residuals are far above the stated deviation."""
         return self.ratio > LARGE
 
-    def text(self, unit: str) -> str:
-        """Misfit as a sentence."""
-        found = []
+    def text(self, unit: str, factor: float) -> str:
+        """Misfit as a sentence, with errors in a unit of which one SI unit has so many."""
+        found, rms = [], factor * self.rms
         if self.large:
-            stated = f"{self.rms / self.ratio:.4g} {unit}".rstrip()
-            found.append(
-                f"residuals of {self.rms:.4g} {unit}".rstrip() + f" are {self.ratio:.3g} times the stated {stated}"
-            )
+            stated = f"{rms / self.ratio:.4g} {unit}".rstrip()
+            found.append(f"residuals of {rms:.4g} {unit}".rstrip() + f" are {self.ratio:.3g} times the stated {stated}")
         if self.structured:
             found.append(
                 f"the errors are not random, so that true values may lie outside their intervals (correlation of neighbours "

@@ -114,6 +114,7 @@ def _candidate(
             violated.append(column)
             why.append(f"{column} has no value")
         uses = {rule: use for rule in TASK_SHARES if math.isfinite(use := row.get(f"{USE}{rule}", math.nan))}
+        uses = {rule: use for rule, use in uses.items() if use <= 1.0 or rule in violated}  # else a recommendation
         critical = max(uses, key=lambda rule: uses[rule], default="")
         tightest = f"{critical} {share_of_limit(uses[critical])}" if critical else ""
     return RankedCandidate(
