@@ -249,7 +249,7 @@ def worm_table() -> str:
         "|---|---|---|---|---|---|---|---|",
     ]
     for record in lm.catalogue():
-        if record.kind != "worm":
+        if record.kind != "worm" or not record.losses.efficiency:  # nothing is known of it
             continue
         gearbox = lm.Gearbox(**worm_values(record))
         at = lm.sizing.overrunning(gearbox)

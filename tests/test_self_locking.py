@@ -252,7 +252,7 @@ def test_the_least_torque_includes_friction_and_the_losses_up_to_the_motor():
 # --- the catalogue ---
 
 
-WORMS = [r.name for r in lm.catalogue() if getattr(r, "kind", "") == "worm"]
+WORMS = [r.name for r in lm.catalogue() if getattr(r, "kind", "") == "worm" and r.losses.efficiency]
 
 
 def catalogue_worm(name: str) -> lm.Gearbox:

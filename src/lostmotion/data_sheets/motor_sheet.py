@@ -121,6 +121,10 @@ class MotorSheet(MotorHeat, Record):
         constants = self.torque_constant is not None and self.resistance is not None
         return DC_EQUIVALENT if constants or self.armature_voltage_constant is not None else TORQUE_SOURCE
 
+    def lacks_phases(self) -> bool:
+        """Whether the heat of the phases of a stepper is not known."""
+        return self.kind == "stepper" and None in (self.resistance_phase, self.rated_current)
+
     def _assumed(self) -> dict[str, str]:
         level, out = self.level(), {}
         if level == TORQUE_SOURCE:

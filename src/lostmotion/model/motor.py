@@ -352,6 +352,12 @@ class Motor(MotorFields):
             return None
         return limits.resistance / (limits.torque_constant * limits.torque_constant), 25.0
 
+    def held_loss(self) -> float | None:
+        """Heat of both phases of a stepper at its rated current, 2 R I² [W]; None if it is not known."""
+        if self.resistance_phase is None or self.rated_current is None:
+            return None
+        return 2.0 * self.resistance_phase * self.rated_current**2
+
     @property
     def unloaded_speed(self) -> float:
         """Speed [rad/s] at command 1 without any load or friction, by (2)."""

@@ -113,7 +113,11 @@ COUPLINGS = tuple(table for table, _ in _tables_of("input", "output", without=Ge
 # Quantities of gears, whose names follow the shaft that they act on,
 # and those of the sampled controllers of motors, the same in every domain.
 OF_GEARS = ("twist", "twist_contact", "hysteresis_capacity", "output_torque", "input_torque")
-OF_CONTROLLERS = {"reference", *(name for name, *_ in (*_core.axis_signals(), *_core.winding_signals()))}
+OF_CONTROLLERS = {
+    "reference",
+    "pointing_error",
+    *(name for name, *_ in (*_core.axis_signals(), *_core.winding_signals())),
+}
 
 
 class DriveTrain(TrainElements):

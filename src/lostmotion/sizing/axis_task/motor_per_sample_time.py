@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...control.command import CurrentLevel
 from ...control.loops import FirstOrderCurrent, IdealCurrent
-from ...model.motor import Motor
 from ...simulation.runs.results import RunArrays
 from ...simulation.scenario.scenario import Scenario
 from ..motor_check import command_of_run, current_voltage_power
@@ -39,7 +39,7 @@ class Electrical:
         m, step = scenario.motor, float(result.time[1] - result.time[0])
         torque = result["motor_torque"][here]
         if m.kind == "stepper":
-            return cls._of_stepper(m, torque)
+            return cls._of_stepper(scenario, result, here)
         oriented = oriented_amplitudes(scenario, result, "motor")
         if oriented is not None:
             assert m.winding is not None
@@ -65,11 +65,35 @@ class Electrical:
         return cls(current, voltage, step * power, square, square, rms)
 
     @classmethod
-    def _of_stepper(cls, m: Motor, torque: np.ndarray) -> Electrical:
-        """The driver holds the rated current, which is its effective value in microsteps; voltage and energy are not known."""
-        rms, unknown = m.rated_current or math.nan, np.full_like(torque, math.nan)
-        square = mean_square(torque)
-        return cls(np.full_like(torque, math.sqrt(2.0) * rms), unknown, unknown[:-1], square, square, rms)
+    def _of_stepper(cls, scenario: Scenario, result: RunArrays, here: slice) -> Electrical:
+        """The driver holds the rated current, which is its effective value in microsteps, and less at rest. Its voltage is not known.
+
+        The energy is the work on the shaft and the heat of the phases.
+        """
+        m, time, torque, speed = (
+            scenario.motor,
+            *(np.asarray(values)[here] for values in (result.time, result["motor_torque"], result["motor_speed"])),
+        )
+        power, square = torque * speed, mean_square(torque)
+        rms, loss = m.rated_current or math.nan, m.held_loss()
+        full, rest = _at_full_current(scenario, time), m.standstill_current or 0.0
+        shares = full + (np.diff(time) - full) * rest**2
+        work = 0.5 * (power[1:] + power[:-1]) * np.diff(time)
+        energy = work + (math.nan if loss is None else loss) * shares
+        held = math.sqrt(float(shares.sum() / (time[-1] - time[0])))
+        unknown = np.full_like(torque, math.nan)
+        return cls(np.full_like(torque, math.sqrt(2.0) * rms), unknown, energy, square, square, rms * held)
+
+
+def _at_full_current(scenario: Scenario, time: np.ndarray) -> np.ndarray:
+    """Part of each interval in which the driver of the stepper holds its full current [s]."""
+    levels = [s for s in scenario.signals().values() if isinstance(s, CurrentLevel)]
+    if not levels:
+        return np.diff(time)
+    points = np.array(levels[0].breakpoint_list())
+    edges = np.append(points[:, 0], max(float(time[-1]), float(points[-1, 0])))
+    passed = np.append(0.0, np.cumsum(points[:, 1] * np.diff(edges)))
+    return np.diff(np.interp(time, edges, passed))
 
 
 def _angle(scenario: Scenario, result: RunArrays, here: slice) -> np.ndarray:

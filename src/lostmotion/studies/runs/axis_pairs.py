@@ -171,7 +171,8 @@ class Axes:
         assert not isinstance(motor, InputError)
         demand, findings = gearbox
         findings, lacking = self._chosen(row, [*findings, *self._braked(row, demand)])
-        if motor.copper_loss() is None and (needing := self._electrical()) is not None:
+        known = motor.held_loss() if motor.kind == "stepper" else motor.copper_loss()
+        if known is None and (needing := self._electrical()) is not None:
             lacking.append(
                 f"the sheet of the motor lacks its winding, which select for {needing} needs; take mechanical_energy"
             )

@@ -224,9 +224,9 @@ def _relative(tables: dict[str, Any], directory: Path) -> dict[str, Any]:
 
 
 def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
-    """Whether a candidate of the motor runs as a torque source, so that only its mechanical energy is known."""
+    """Whether only the mechanical energy of a candidate of the motor is known: it runs as a torque source, or is a stepper without data of its phases."""
     from ...data_sheets.linear_sheets import FORCE_SOURCE
-    from ...data_sheets.motor_sheet import STEPPER, TORQUE_SOURCE, MotorSheet
+    from ...data_sheets.motor_sheet import TORQUE_SOURCE, MotorSheet
 
     whole = [entry for entry in vary if isinstance(entry, dict) and entry.get("key") in WHOLE]
     if any(
@@ -238,10 +238,11 @@ def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
     if not records:
         given = written["motor"]
         if "from" not in given:
-            return given.get("kind") in ("torque_source", "stepper")
+            phases = given.get("resistance_phase") is not None and given.get("rated_current") is not None
+            return given.get("kind") == "torque_source" or (given.get("kind") == "stepper" and not phases)
         names = [given["from"]]
     sheets = (find(name, "motor") for name in names)
-    return any(isinstance(sheet, MotorSheet) and sheet.level() in (TORQUE_SOURCE, STEPPER) for sheet in sheets)
+    return any(isinstance(s, MotorSheet) and (s.level() == TORQUE_SOURCE or s.lacks_phases()) for s in sheets)
 
 
 def _any_stepper(written: dict[str, Any], vary: list[Any]) -> bool:
