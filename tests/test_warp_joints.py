@@ -206,3 +206,25 @@ def test_the_kernel_is_compiled_for_a_graphics_processor(tmp_path: object) -> No
     from lostmotion.warp.kernel import joint_kernel
 
     wp.compile_aot_module(joint_kernel("float32").module, device=None, arch=90, module_dir=tmp_path, use_ptx=True)
+
+
+def test_a_slide_behind_a_screw_moves_as_in_attach() -> None:
+    motor = {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 2e-4, "friction_torque": 0.05}
+    screw = {"input": "motor", "output": "table", "lead": 0.01, "efficiency": 0.9, "stiffness": 8e5}
+    axis = lm.Scenario(
+        shafts={"motor": {}},
+        slides={"table": {"mass": 30.0, "friction_force": 20.0}},
+        motors={"m": motor},
+        screws={"s": screw},
+        command={"m": {}},
+        simulation={"duration": 1.0, "sample_interval": 1e-3},
+    )
+    body = '<joint name="table" type="slide" axis="0 0 1"/><inertial pos="0 0 0" mass="80" diaginertia="1 1 1"/>'
+    text = f'<mujoco><option timestep="0.001" gravity="0 0 0"/><worldbody><body>{body}</body></worldbody></mujoco>'
+    robot, exact = Robot(text, {"table": axis}, dtype="float64"), lm.mujoco.attach(mujoco.MjModel.from_xml_string(text), {"table": axis})
+    robot.run(lambda t: {"table": 2.0 + 0.5 * np.sin(30.0 * t)}, 0.1)
+    for k in range(100):
+        exact.step([2.0 + 0.5 * np.sin(30.0 * k * 1e-3)])
+    # MuJoCo Warp keeps speeds and positions in float32, and its scheme is of first order where the two are of second.
+    assert robot.d.qpos.numpy()[0, 0] == pytest.approx(exact.data.qpos[0], rel=1e-3)
+    assert exact.data.qpos[0] > 0.03

@@ -281,12 +281,10 @@ def _servo(joint: str, train: DriveTrain, law: _Law) -> JointActuator:
     of_angle, of_speed = (-bias * per_joint for bias in law.bias)
     position = of_angle > 0.0
     loop = {"position": {"gain": of_angle, "derivative_gain": of_speed}} if position else {"speed": {"gain": of_speed}}
-    controller = ContinuousController(
-        kind="continuous",
-        shaft="load",
-        reference={"kind": "position" if position else "speed"},
-        limit=None if math.isinf(high) else high * abs(law.gear) / ratio,
-        **loop,
+    limit = None if math.isinf(high) else high * abs(law.gear) / ratio
+    kind = "position" if position else "speed"
+    controller = ContinuousController.model_validate(
+        {"kind": "continuous", "shaft": "load", "reference": {"kind": kind}, "limit": limit, **loop}
     )
     scale = law.gain / (-law.bias[0 if position else 1] * law.gear)
     return JointActuator(Scenario.of_any(train).with_axes({"motor": controller}), scale, *law.control)

@@ -126,8 +126,8 @@ def reduce(
         values = sign * _not_negative(sign * columns, target)
     left = target - columns @ values
     gear, armature, damping, loss = map(float, values)
-    rms = [float(np.sqrt(np.mean(x * x))) for x in (left, target)]
-    return Reduction(armature, damping, loss, gear, *rms, slides=train.is_slide(joint))
+    error, torque = (float(np.sqrt(np.mean(x * x))) for x in (left, target))
+    return Reduction(armature, damping, loss, gear, error, torque, train.is_slide(joint))
 
 
 def _torque_source(train: DriveTrain) -> DriveTrain:

@@ -85,7 +85,7 @@ class Drives:
         if seed < 0:
             raise InputError(f"seed: {seed} must be 0 or above")
         scenario = Scenario.of_any(drive)
-        core = scenario.core(loaded=list(scenario.tables.shafts)[-1:], given=())
+        core = scenario.core(loaded=list(scenario.train().shafts)[-1:], given=())
         if scenario.axes() or scenario.continuous():
             raise InputError("drive: a controller turns the motor; give the drive alone, scenario.drive()")
         if error := _core.DriveBatch.error(core, OPEN_LOOP):

@@ -12,7 +12,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.validation import listed, shown
 from ..mujoco.attaching import alone_on_joint
-from ..mujoco.joints import compiled, is_slide, joint_id, mass_matrix
+from ..mujoco.joints import compiled, mass_matrix
 from ..simulation.batches.batch_parameters import mask_of_drives
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives
@@ -57,9 +57,8 @@ class Joints:
             numbers = [joints[name] for name in names]
             dofs = model.jnt_dofadr[numbers]
             inertias = np.repeat(first[dofs], self._worlds)
-            made = Drives(
-                scenario, self._worlds * len(names), vary={"load.inertia": inertias}, dtype=dtype, device=str(device)
-            )
+            vary = {scenario.inertia_key(list(scenario.train().shafts)[-1]): inertias}
+            made = Drives(scenario, self._worlds * len(names), vary=vary, dtype=dtype, device=str(device))
             engine = kernel.engine_arrays(dtype)()
             engine.worlds, engine.n_dofs, engine.n_positions = self._worlds, model.nv, model.nq
             engine.n_masses, engine.masses = d.M.shape[1], d.M
@@ -203,10 +202,10 @@ def attach(
     m, d
         Model and data of `mujoco_warp`.
     drives
-        By the name of a hinge what `lm.mujoco.attach` takes, without controllers: a drive, a scenario or its name, the name of
+        By the name of a hinge or a slide what `lm.mujoco.attach` takes, without controllers: a drive, a scenario or its name, the name of
         an actuator or a gearbox of the catalogue. Each has one motor and one gear.
     stiffness
-        Gain of the position [N·m/rad] of a law of the motor by its own encoder, for all joints or by name; those left out
+        Gain of the position [N·m/rad], of a slide [N/m], of a law of the motor by its own encoder, for all joints or by name; those left out
         are commanded without a law. Both gains are referred to the joint.
     damping
         Gain of the speed [N·m·s/rad], in the same way.
@@ -223,7 +222,7 @@ def attach(
     Raises
     ------
     InputError
-        A joint is unknown or no hinge; the model has armature, damping, friction loss or an actuator there; a drive has more
+        A joint is unknown; the model has armature, damping, friction loss or an actuator there; a drive has more
         than the walk takes; a law is for a motor that is no torque source; the integrator is Runge and Kutta's.
     MissingLibraryError
         Warp is not installed.
@@ -269,11 +268,6 @@ def attach(
     gains = _gains(drives, stiffness, damping)
     made = {}
     for name, given in drives.items():
-        if is_slide(robot, joint_id(robot, name)):
-            raise InputError(
-                f"joint {name!r}: is a slide, and the drives on a GPU have one motor, one gearbox and a load that turns; "
-                "lm.mujoco.attach takes slides"
-            )
         scenario = alone_on_joint(robot, name, given, None, replace=False)
         kinds = {motor.kind for motor in scenario.train().motors.values()}
         if name in gains and kinds != {"torque_source"}:

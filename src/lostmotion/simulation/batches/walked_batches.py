@@ -161,7 +161,7 @@ class WalkedBatch:
 
 def _core_of(scenario: Scenario) -> _core.Train:
     """The solver's train, where nothing else than a load torque acts on the last shaft."""
-    return scenario.core(loaded=list(scenario.tables.shafts)[-1:], given=())
+    return scenario.core(loaded=list(scenario.train().shafts)[-1:], given=())
 
 
 def _error(scenario: Scenario, tuned: Scenario) -> str:

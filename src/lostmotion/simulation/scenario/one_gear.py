@@ -16,8 +16,12 @@ def drive_keys(scenario: Scenario) -> dict[str, str]:
     """Keys of a motor, a gear and its output shaft in the long form, and what a drive calls them."""
     train = scenario.train()
     ((motor, _),), ((gear, between),) = train.motors.items(), train.gears.items()
-    found = {f"shafts.{between.output}": LOAD, f"gears.{gear}": GEARBOX, f"motors.{motor}": MOTOR}
-    return found | {f"command.{motor}": "command"}
+    load = between.output
+    found = {f"shafts.{load}": LOAD, f"gears.{gear}": GEARBOX, f"motors.{motor}": MOTOR, f"command.{motor}": "command"}
+    return found | {
+        f"slides.{load}.mass": f"{LOAD}.inertia",
+        f"slides.{load}.friction_force": f"{LOAD}.friction_torque",
+    }
 
 
 def has_one_gear(scenario: Scenario) -> bool:

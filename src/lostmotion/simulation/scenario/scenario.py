@@ -353,6 +353,10 @@ class Scenario:
         )
         return self.own_key(f"command.{next(names)}")
 
+    def inertia_key(self, shaft: str) -> str:
+        """Key of the inertia of a shaft, or of the mass of a slide."""
+        return self.own_key(f"slides.{shaft}.mass" if shaft in self.tables.slides else f"shafts.{shaft}.inertia")
+
     def load_key(self, shaft: str) -> str:
         """Key of the load torque on a shaft, or of the load force on a slide."""
         return self.own_key(f"slides.{shaft}.force" if shaft in self.tables.slides else f"shafts.{shaft}.torque")
