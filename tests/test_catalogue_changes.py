@@ -1,6 +1,5 @@
 """Changes to what the catalogue has."""
 
-import tomllib
 from pathlib import Path
 
 import numpy as np
@@ -8,15 +7,11 @@ import pytest
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT
 from lostmotion.cli import app
-from lostmotion.data_sheets.motor_sheet import MotorSheet
-from lostmotion.data_sheets.records import parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.reports.rig import summary_rows
 from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 from lostmotion.test_rig.virtual_rig import TestRig
-from refusals import refuses
 from sheets import ARCMIN, scenario_with, sheet
 
 
@@ -160,17 +155,6 @@ def test_changed_parts_are_those_that_the_rig_measures(tmp_path: Path):
     assert part.stiffness.slopes == (3e3, 2e4, 3e4)
 
 
-def test_a_sheet_that_says_maker_for_the_manufacturer_is_read_as_before(tmp_path: Path):
-    text = (ROOT / "src" / "lostmotion" / "catalogue" / "worm-nord-si50.toml").read_text()
-    former = text.replace("manufacturer =", "maker =").replace('"manufacturer"', '"maker"')
-    assert former.count('maker = "NORD"') == former.count('status = "maker"') == 1
-    records = parse_sheets(tomllib.loads(former), "former.toml")
-    assert records == parse_sheets(tomllib.loads(text), "now.toml")
-    assert {(r.manufacturer, r.sources[-1].status) for r in records} == {("NORD", "manufacturer")}
-    with refuses("maker"):
-        parse_sheets(tomllib.loads('maker = "A"\nmanufacturer = "B"\n' + former.replace('maker = "NORD"', "")), "both.toml")
-
-
 def test_the_rig_gives_no_figure_where_there_is_no_cause():
     """A curve without hysteresis and backlash has no loop; what the rig measures of one is rounding."""
     plain = lm.gearbox("paper-gearbox").model_copy(update={"hysteresis": None})
@@ -196,17 +180,3 @@ def test_a_reversed_range_is_told_as_such():
         assert sentence in str(done.exception or "").replace("'", '"')
     bare, united = (CliRunner().invoke(app, ["catalogue", "--torque", t]) for t in ("20..30", "20 Nm..3 kgf*m"))
     assert bare.exit_code == united.exit_code == 0
-
-
-def test_sheets_with_former_words_are_read() -> None:
-    """`maker`, `figures` and `figure` stood for `manufacturer`, `data` and `datum`."""
-    former = {
-        "name": "old",
-        "rated_voltage": 24.0,
-        "sources": [{"figures": ["rated_voltage"], "status": "maker", "text": "page 7"}],
-        "gaps": [{"figure": "inductance", "where": "page 8"}],
-    }
-    sheet = MotorSheet(**former)
-    assert sheet.sources[0].data == ("rated_voltage",)
-    assert sheet.sources[0].status == "manufacturer"
-    assert sheet.where("inductance") == "page 8"

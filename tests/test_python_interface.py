@@ -421,12 +421,9 @@ def test_no_module_hides_a_public_name_of_its_namespace(space) -> None:
 
 
 @pytest.mark.parametrize("name", [n for n in PATHS if n not in FLAT and "." not in n])
-def test_names_that_moved_into_a_namespace_forward_with_a_warning(name) -> None:
-    place = re.escape(f"lostmotion.{name} is now lostmotion.{PATHS[name]}")
-    with pytest.warns(DeprecationWarning, match=place) as caught:
-        old = getattr(lm, name)
-    assert old is public(name)
-    assert caught[0].filename == __file__
+def test_a_name_of_a_namespace_is_told_where_it_is(name) -> None:
+    with pytest.raises(AttributeError, match=re.escape(f"it is lostmotion.{PATHS[name]}")):
+        getattr(lm, name)
 
 
 def test_an_unknown_name_is_no_attribute() -> None:

@@ -111,12 +111,13 @@ def test_a_csv_file_that_is_cut_at_the_end_of_a_line_is_refused(result: xr.Datas
         lm.open_result(tmp_path / "cut.csv")
 
 
-def test_a_csv_file_that_does_not_say_how_many_samples_it_has_still_loads(result: xr.Dataset, tmp_path: Path) -> None:
+def test_a_csv_file_without_the_number_of_its_samples_is_refused(result: xr.Dataset, tmp_path: Path) -> None:
     lm.save(result, tmp_path / "r.csv")
     text = (tmp_path / "r.csv").read_text()
     assert text.count(', "samples": 2001') == 1
-    (tmp_path / "old.csv").write_text(text.replace(', "samples": 2001', ""))
-    xr.testing.assert_identical(lm.open_result(tmp_path / "old.csv"), result)
+    (tmp_path / "cut.csv").write_text(text.replace(', "samples": 2001', ""))
+    with pytest.raises(lm.InputError, match="is no result of lostmotion"):
+        lm.open_result(tmp_path / "cut.csv")
 
 
 def test_what_is_no_result_has_no_switchings() -> None:

@@ -162,7 +162,7 @@ def test_what_is_wrong_with_a_parameter_is_said_in_the_words_of_the_file(tmp_pat
 
 
 def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
-    filters = '{ kind = "strain_wave", ratio = [90, 110], rated_output_torque = ["20 N*m", "60 N*m"], maker = "Schae*" }'
+    filters = '{ kind = "strain_wave", ratio = [90, 110], rated_output_torque = ["20 N*m", "60 N*m"], manufacturer = "Schae*" }'
     study = lm.studies.load_study(write(tmp_path, f'[[vary]]\nkey = "gearbox"\ncatalogue = {filters}'))
     fitting = {
         r.name

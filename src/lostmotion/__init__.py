@@ -10,9 +10,8 @@ The names that most programs use are in `lostmotion` itself, the others in names
 from __future__ import annotations
 
 from types import ModuleType
-from typing import Any
 
-from .namespace import moved, namespace, when_taken
+from .namespace import namespace, when_taken
 
 # Modules whose functions return datasets: importing one of their names registers the accessor `result.lm`.
 _WITH_DATASETS = (
@@ -52,8 +51,4 @@ def _show_results(module: ModuleType) -> None:
 
 when_taken.append(_show_results)
 
-_get, __dir__ = namespace(__name__)
-
-
-def __getattr__(name: str) -> Any:
-    return _get(name) if name.startswith("_") or name in __dir__() else moved(name)
+__getattr__, __dir__ = namespace(__name__)

@@ -9,7 +9,6 @@ import importlib
 import importlib.util
 import re
 import sys
-import warnings
 from collections.abc import Callable
 from pathlib import Path
 from types import ModuleType
@@ -17,9 +16,6 @@ from typing import Any
 
 _TOP = "lostmotion"
 _LINE = re.compile(r"from (\.[\w.]*) import (\w+) as \2\n")
-
-# Names that were taken together in another one.
-_RENAMED = {"DriveScenario": "Scenario", "TrainScenario": "Scenario"}
 
 when_taken: list[Callable[[ModuleType], None]] = []
 """functions to call with each module from which a public name is taken"""
@@ -43,10 +39,8 @@ def namespace(package: str) -> tuple[Callable[[str], Any], Callable[[], list[str
     def get(name: str) -> Any:
         if name == "__all__":
             return [*known()]
-        if name in _RENAMED:
-            return _old(f"{package}.{name}", importlib.import_module(_TOP), _RENAMED[name])
         if name not in known():
-            raise AttributeError(f"module {package!r} has no attribute {name!r}")
+            raise AttributeError(f"module {package!r} has no attribute {name!r}{_hint(package, name)}")
         value = _public(known()[name], name)
         setattr(sys.modules[package], name, value)
         return value
@@ -66,25 +60,7 @@ def _public(home: str, name: str) -> Any:
     return getattr(module, name)
 
 
-def _old(name: str, module: Any, new: str) -> Any:
-    warnings.warn(
-        f"{name} is now {module.__name__}.{new}; the old name will go in the next release",
-        DeprecationWarning,
-        stacklevel=4,
-    )
-    return getattr(module, new)
-
-
-def moved(name: str) -> Any:
-    """The value of a name that used to be flat in `lostmotion`, from its namespace, with a warning.
-
-    Raises AttributeError where no namespace has the name.
-    """
-    if name in _RENAMED:
-        return _old(f"{_TOP}.{name}", importlib.import_module(_TOP), _RENAMED[name])
-    spaces = [space for space, home in homes_of(_TOP).items() if home == _TOP]
-    for space in spaces:
-        module = importlib.import_module(f"{_TOP}.{space}")
-        if name in homes_of(module.__name__):
-            return _old(f"{_TOP}.{name}", module, name)
-    raise AttributeError(f"module {_TOP!r} has no attribute {name!r}")
+def _hint(package: str, name: str) -> str:
+    """The namespace that has a name which `lostmotion` itself lacks, as the end of a message."""
+    spaces = [space for space, home in homes_of(_TOP).items() if home == _TOP and package == _TOP and name[0] != "_"]
+    return next((f"; it is {_TOP}.{space}.{name}" for space in spaces if name in homes_of(f"{_TOP}.{space}")), "")

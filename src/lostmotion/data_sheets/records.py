@@ -19,7 +19,6 @@ from .actuator_sheet import ActuatorSheet
 from .gearbox_sheet import GearboxSheet
 from .linear_sheets import BeltSheet, LinearMotorSheet, RackSheet, ScrewSheet
 from .motor_sheet import MotorSheet
-from .sheet import in_current_words
 
 Sheet: TypeAlias = (
     GearboxSheet
@@ -122,19 +121,17 @@ def parse_sheets(data: dict[str, Any], where: str) -> list[Sheet]:
 def _entries(data: dict[str, Any], where: str) -> Iterator[Entry]:
     """The kind of each record of a sheet file, its fields, and what it is called in messages."""
     known = {*KINDS, *COMMON, "source", "gap"}
-    data = in_current_words(data)
     for key in data:
         if key not in known:
             raise InputError(unknown_key(key, known), key, where=where)
     common = {key: data[key] for key in COMMON if key in data}
     for table, kind in KINDS.items():
         for entry in _tables(data, table, where):
-            own = in_current_words(entry)
-            which = f"{where}: {table} {own.get('name', '(no name)')}"
-            fields = common | own
+            which = f"{where}: {table} {entry.get('name', '(no name)')}"
+            fields = {**common, **entry}
             for key in ("source", "gap"):  # those of the record, then those of the whole file
                 fields.pop(key, None)
-                fields[f"{key}s"] = [*_tables(own, key, which), *_tables(data, key, where)]
+                fields[f"{key}s"] = [*_tables(entry, key, which), *_tables(data, key, where)]
             yield kind, fields, which
 
 

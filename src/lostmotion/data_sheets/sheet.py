@@ -1,9 +1,8 @@
 """Common fields of the records of data sheets: sources of the data, and gaps."""
 
-from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Literal
 
-from pydantic import BeforeValidator, Field, model_validator
+from pydantic import BeforeValidator, Field
 
 from ..inputs.part import Part
 from ..inputs.quantities import Length, Mass, Number, Positive, Switch, Time
@@ -13,18 +12,6 @@ from .loss_data import LossData
 
 # Fields of a record that are no data.
 WORDS = ("name", "manufacturer", "title", "note", "sources", "gaps", "illustrative")
-# Sheets written before may have these words.
-FORMER_WORDS = {"maker": "manufacturer", "figures": "data", "figure": "datum"}
-
-
-def current_word(word: Any) -> Any:
-    """A key or a status as it is called now."""
-    return FORMER_WORDS.get(word, word) if isinstance(word, str) else word
-
-
-def in_current_words(table: Mapping[str, Any]) -> dict[str, Any]:
-    """A table with its keys as they are called now; a key that is given in both words stays, and is refused as unknown."""
-    return {key if current_word(key) in table else current_word(key): value for key, value in table.items()}
 
 
 def in_lower_case(name: Any) -> Any:
@@ -32,26 +19,17 @@ def in_lower_case(name: Any) -> Any:
     return name.lower() if isinstance(name, str) else name
 
 
-class Remark(Part):
-    """A remark on some data."""
-
-    @model_validator(mode="before")
-    @classmethod
-    def _in_current_words(cls, table: Any) -> Any:
-        return in_current_words(table) if isinstance(table, Mapping) else table
-
-
-class Source(Remark):
+class Source(Part):
     """Origin of data: their status, and the text that contains them."""
 
     data: tuple[str, ...]
     """keys of the record that it covers"""
-    status: Annotated[Literal["manufacturer", "transcription", "inferred", "identified"], BeforeValidator(current_word)]
+    status: Literal["manufacturer", "transcription", "inferred", "identified"]
     """read in the manufacturer's own text, transcribed by somebody else, concluded from other data, or identified from measured logs"""
     text: str
 
 
-class Gap(Remark):
+class Gap(Part):
     """A datum that the record lacks."""
 
     datum: str

@@ -188,10 +188,9 @@ def _header(dataset: xarray.Dataset) -> str:
 def _assemble(header: str, columns: dict[str, Any], path: Path) -> xarray.Dataset:
     try:
         meta = json.loads(header)
-        time = columns.pop("time")
+        written, time = meta["samples"], columns.pop("time")
     except (json.JSONDecodeError, KeyError):
         raise InputError(f"{path}: is no result of lostmotion; its header or its time column is missing") from None
-    written = meta.get("samples", len(time))  # files of older versions do not say it
     if len(time) != written:
         raise InputError(
             f"{path}: holds {len(time)} of the {written} samples that its header announces; it is cut off or changed; run the scenario again"

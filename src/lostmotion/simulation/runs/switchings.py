@@ -28,7 +28,7 @@ TORQUES = ("output_torque_before", "output_torque_after")
 def names_in(attributes: Mapping[str, Any]) -> tuple[str, ...]:
     """Names of the columns of the switchings of a result with these attributes."""
     if COLUMNS not in attributes:
-        raise InputError("this result is of an earlier version, whose switchings are numbered otherwise; run it again")
+        raise InputError("this result does not name the columns of its switchings; run it again")
     return tuple(str(attributes[COLUMNS]).split())
 
 

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import Any
 
 from ...data_sheets.records import KINDS, called, catalogue, find, read_again
-from ...data_sheets.sheet import in_current_words
 from ...data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, without_record
 from ...errors import InputError
 from ...inputs.schema import unit_in_schema
@@ -80,7 +79,6 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     schema = KINDS[table].model_json_schema()["properties"]
     known = [key for key, node in schema.items() if unit_in_schema(node) is not None or _is_text(key)]
     bounds = {}
-    wanted = in_current_words(wanted)
     for key, value in wanted.items():
         if key not in known:
             raise ValueError(
