@@ -24,6 +24,7 @@ from .targets import try_directory, try_file, writing
 from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:
+    from ..errors import InputError
     from ..servo.commission import ServoReport
     from ..servo.tuning_result import Tuning
     from ..simulation.scenario.scenario import Scenario
@@ -134,7 +135,10 @@ def servo(
     if wanted and rule is None:
         raise InputError(f"{next(iter(wanted))}: goes with --tune RULE; add a rule")
     missing: list[str] = []
-    loaded = load_scenario(scenario, overrides, None if rule is None else missing)
+    try:
+        loaded = load_scenario(scenario, overrides, None if rule is None else missing)
+    except InputError as error:
+        raise (_or_tuned(error) if rule is None else error) from None
     _try(files, directories)
     if loaded.continuous() and not loaded.axes():
         asked = {"--tune": rule, "--window": window, "--motor": motor, "--drive-units": drive_units or None}
@@ -175,6 +179,15 @@ def servo(
         _print_drive_units(loaded, motor)
     print("\n".join([*written, _next(again(scenario, overrides), files, directories, rule, wanted)]))
     conclude(report.verdict)
+
+
+def _or_tuned(error: InputError) -> InputError:
+    """The error of a scenario without gains, with the option that finds them."""
+    from ..servo.tuning_result import missing_gains
+
+    if not (keys := missing_gains(error)):
+        return error
+    return type(error)("no gain is given; add it, or find it: --tune margins", *keys, where=error.where)
 
 
 def _print_tuned(tuned: Tuning) -> None:

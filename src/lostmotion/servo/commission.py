@@ -324,6 +324,11 @@ class ServoReport:
             return f"{'no limit cycle' if whole.verdict == 'at rest' else whole.verdict}: {whole.described()}"
         frequency = "irregular" if math.isnan(whole.frequency) else f"{whole.frequency:.4g} Hz"
         motor, load = _shown(whole.motor_amplitude, self.motor_unit), _shown(whole.amplitude, self.load_unit)
+        if whole.floats:
+            return (
+                f"the motor stands and the load still swings by ±{load}, {frequency}, undamped: it floats in the backlash; "
+                "give the load a friction, or the gear a mesh_damping"
+            )
         text = f"limit cycle: ±{motor} at the motor, ±{load} at the load, {frequency}"
         return f"hunts, {text}; cause: {' and '.join(cycle.causes) or 'none of ' + ', '.join(cycle.without)}"
 

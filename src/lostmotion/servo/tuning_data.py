@@ -65,7 +65,7 @@ def frictions(axis: Axis) -> tuple[float, float]:
 def _without_load(gear: Gear | Gearbox, speed: float) -> tuple[float, float]:
     """Viscous [N·m·s/rad] and dry friction [N·m] at the input of a gear without load.
 
-    They are the straight line that is nearest to its losses up to a speed [rad/s].
+    They are the straight line that is nearest to its losses up to a speed [rad/s], and does not fall.
     """
     losses, rated = gear.losses, gear.rated_input_speed or 1.0
     if not isinstance(losses, LossMap):
@@ -73,7 +73,9 @@ def _without_load(gear: Gear | Gearbox, speed: float) -> tuple[float, float]:
     table, w = losses.core(), np.linspace(0.0, speed or rated, 101)
     torque = np.array([table(0.0, x / rated) for x in w]) * (gear.rated_output_torque or 1.0) / abs(gear.ratio)
     slope, dry = np.polyfit(w, torque, 1)
-    return gear.viscous_friction + float(slope), float(dry)
+    if slope < 0.0:  # losses that fall with the speed, or rounding where they are constant
+        slope, dry = 0.0, torque.mean()
+    return gear.viscous_friction + float(slope), float(max(dry, 0.0))
 
 
 def secant(gear: Gear | Gearbox) -> float:

@@ -128,12 +128,15 @@ class Tuning:
 
 
 def load_untuned(source: str | Path, overrides: Iterable[str], missing: list[str]) -> Scenario:
-    """The scenario of a file that may leave out the gains to be found. They are 1 in it; their keys are added to `missing`."""
+    """The scenario of a file that may leave out the gains to be found, or the tables of their loops.
+
+    They are 1 in it; their keys are added to `missing`.
+    """
     given = [*overrides, *(f"{key}=1" for key in missing)]
     try:
         loaded = load(source, given)
     except InputError as error:
-        keys = [key for problem in error.problems for key in problem.keys if key.endswith(GAINS)]
+        keys = missing_gains(error)
         if not keys or set(keys) & {text.partition("=")[0] for text in given}:
             raise
         missing += keys
@@ -141,6 +144,17 @@ def load_untuned(source: str | Path, overrides: Iterable[str], missing: list[str
     plain = loaded.title.partition(CHANGED)[0]
     title = title_with(plain, [text.partition("=")[0].strip() for text in overrides])
     return loaded.model_copy(update={"title": title}) if missing else loaded
+
+
+def missing_gains(error: InputError) -> list[str]:
+    """Keys of the gains that a file lacks, also with the table of their loop."""
+    keys = [key for problem in error.problems for key in problem.keys if key.endswith(GAINS)]
+    loops = [(key, loop) for p in error.problems for key in p.keys for loop in GAINS if _lacks(p.reason, loop)]
+    return keys + [f"{key}{loop}" for key, loop in loops]
+
+
+def _lacks(reason: str, gain: str) -> bool:
+    return reason.startswith(f"lacks {gain.split('.')[1]}, ")
 
 
 def conventions(

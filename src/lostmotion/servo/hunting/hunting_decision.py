@@ -421,9 +421,9 @@ def _why(watch: WatchedRun, outlook: Outlook) -> str:
         return "nothing moves by more than a billionth of a turn, but not all contacts are stuck, or the controllers still move"
     k = moving[0]
     ratio = last[k] / max(before[k], last[k] * 1e-9)
-    course = "as much as before" if 0.95 < ratio < 1.05 else f"{ratio:.3g} times as much as in the time before"
+    course = "undamped" if 0.95 < ratio < 1.05 else f"{ratio:.3g} times as much as in the time before"
     moved = practical(float(last[k]), watch.units[k], 3)
-    return f"{watch.names[k].replace('_', ' ')} still moves by {moved}, {course}"
+    return f"{watch.names[k].replace('_', ' ')} still swings by {moved}, {course}"
 
 
 def moving_input(scenario: Scenario) -> str:

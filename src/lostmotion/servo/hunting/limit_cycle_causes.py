@@ -24,6 +24,7 @@ PART = 0.5  # of the amplitude, below which leaving something out takes a limit 
 REST = 10.0  # of the slowest time constants of the loops, for which an axis is watched at least
 MOST_TICKS = 4e6  # for which it is watched at most
 PATIENCE = 4.0  # times as long as the whole axis, for which one without a possible cause is watched
+STILL = 1e-6  # of the swing of the load, below which the motor stands
 FINEST_BITS = 40  # of an encoder
 
 
@@ -54,6 +55,11 @@ class AtRest:
         """Whether it hunts."""
         return self.verdict == "hunts"
 
+    @property
+    def floats(self) -> bool:
+        """Whether the load alone swings, while the motor stands."""
+        return self.cycles and self.motor_amplitude < STILL * self.amplitude
+
     def described(self) -> str:
         """Why it does not hunt, with what was watched."""
         return f"{self.reason} ({self.watched:.4g} s after the end of the reference)"
@@ -72,8 +78,8 @@ class LimitCycle:
         """Causes without which there is no limit cycle, or less than half of the amplitude."""
         if not self.whole.cycles:
             return []
-        low = PART * self.whole.motor_amplitude
-        return [name for name, rest in self.without.items() if rest.motor_amplitude < low]
+        size = (lambda r: r.amplitude) if self.whole.floats else (lambda r: r.motor_amplitude)
+        return [name for name, rest in self.without.items() if size(rest) < PART * size(self.whole)]
 
 
 def limit_cycle(axis: Axis, most: float = math.inf) -> LimitCycle | None:
