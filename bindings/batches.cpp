@@ -272,6 +272,18 @@ void bind_batches(nb::module_& m) {
                 return read_batch(b, [&](double* out) { b.read_variable(variable, out); });
             },
             "variable"_a, "The values of a variable, by its number among the names.")
+        .def(
+            "carry_tangents",
+            [](B& b, const std::vector<std::string>& keys) {
+                if (!b.carry_tangents(keys)) throw nb::value_error("no parameter of a drive");
+            },
+            "keys"_a, "Carries along the derivatives of the states by parameters.")
+        .def(
+            "tangent",
+            [](const B& b, std::size_t parameter, std::size_t state) {
+                return read_batch(b, [&](double* out) { b.read_tangent(parameter, state, out); });
+            },
+            "parameter"_a, "state"_a)
         .def("snapshot", &B::snapshot)
         .def("restore", &restore_batch<B>, "snapshot"_a)
         .def_prop_ro("counts",

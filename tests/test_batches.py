@@ -518,6 +518,86 @@ def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:
     batch.step(0.1)
 
 
+# --- sensitivities ---
+
+MOVED = ("motor_speed", "load_speed", "twist", "load_angle")
+
+
+@pytest.mark.parametrize(
+    ("name", "keys"),
+    [
+        ("paper-2dof-nl-small", ["load.inertia", "gearbox.ratio", "motor.friction_torque", "gearbox.hysteresis.efficiency"]),
+        ("catalogue-robot-joint", ["load.inertia", "load.friction_torque", "gearbox.ratio", "motor.rated_torque"]),
+        ("backlash-reversing-load", ["gearbox.stiffness.backlash", "load.inertia", "motor.rotor_inertia"]),
+        ("step-to-standstill", ["load.friction_torque", "motor.rated_speed", "gearbox.rated_output_torque"]),
+    ],
+)
+def test_sensitivities_are_those_of_a_run(name: str, keys: list[str]) -> None:
+    """The run integrates the variational equations of the train, with the derivative of the reset at each switching."""
+    drive, pause, count = lm.load(name).drive(), 5e-3, 20
+    commands = np.random.default_rng(3).uniform(-0.3, 0.3, count)
+    batch = lm.SimulationBatch(drive, pause, count=1, sensitivities=keys)
+    for command in commands:
+        batch.step(command)
+    heights = np.diff(commands, prepend=0.0)
+    steps = [{"time": pause * k, "height": float(height)} for k, height in enumerate(heights)]
+    run = lm.Scenario.of_any(drive).replace(
+        **{"command": {"steps": steps}, "simulation.duration": pause * count, "simulation.sample_interval": pause}
+    )
+    right = lm.simulate(run, sensitivities=keys)
+    for variable in MOVED:
+        expected = right[f"{variable}_sensitivity"].values[:, -1]
+        assert batch[f"{variable}_sensitivity"][:, 0] == pytest.approx(expected, rel=1e-8), variable
+
+
+def test_a_sensitivity_has_a_closed_form_and_follows_what_is_written() -> None:
+    """A rigid gear without losses: (J + i² J_M) w' = i M; a snapshot takes the derivatives along."""
+    drive = simple_drive().model_copy(
+        update={
+            "motor": lm.Motor(kind="torque_source", rotor_inertia=1e-3, rated_torque=2.0),
+            "gearbox": lm.Gearbox(
+                ratio=10,
+                stiffness=lm.model.Rigid(),
+                losses=lm.model.ConstantEfficiency(efficiency=1.0),
+                rated_input_speed=400.0,
+                rated_output_torque=50.0,
+            ),
+        }
+    )
+    keys = ["load.inertia", "gearbox.ratio", "motor.rated_torque"]
+    batch = lm.SimulationBatch(drive, 0.1, count=2, sensitivities=keys)
+    assert not batch["load_speed_sensitivity"].any()
+    batch.parameters["load.inertia"][1] = 4.0
+    batch.step(0.5)
+    J, i, J_M, M, t = np.array([1.0, 4.0]), 10.0, 1e-3, 1.0, 0.1
+    total = J + i**2 * J_M
+    right = np.array([-i * M / total**2, M / total - i * M * 2 * i * J_M / total**2, i * 0.5 / total]) * t
+    assert batch["load_speed_sensitivity"] == pytest.approx(right, rel=1e-12)
+    assert batch["load_angle_sensitivity"] == pytest.approx(right * t / 2, rel=1e-12)
+    before = batch.snapshot()
+    batch.step(0.5)
+    assert batch["load_speed_sensitivity"] == pytest.approx(2 * right, rel=1e-12)
+    batch.restore(before)
+    assert batch["load_speed_sensitivity"] == pytest.approx(right, rel=1e-12)
+    batch.reset(np.array([True, False]))
+    assert not batch["load_speed_sensitivity"][:, 0].any() and batch["load_speed_sensitivity"][:, 1].any()
+
+
+@pytest.mark.parametrize(
+    ("scenario", "key", "message"),
+    [
+        ("paper-2dof-nl-small", "gearbox.stiffness.backlash", "is 0 for drive 0"),
+        ("paper-2dof-nl-small", "simulation.duration", "no number that a batch differentiates by"),
+        ("paper-2dof-nl-small", "load.inertias", "did you mean load.inertia"),
+        ("position-axis", "load.inertia", "a controller turns the motor"),
+        ("two-motors-one-ring", "shafts.ring.inertia", "lm.simulate takes all trains"),
+    ],
+)
+def test_sensitivities_that_a_batch_does_not_carry_are_refused(scenario: str, key: str, message: str) -> None:
+    with pytest.raises(lm.InputError, match=message):
+        lm.SimulationBatch(lm.load(scenario), STEP, count=2, sensitivities=[key])
+
+
 # --- controllers and given motions ---
 
 

@@ -146,7 +146,7 @@ CALLS: dict[str, tuple[Callable[..., Any], dict[str, Any]]] = {
     "warm_up": (lm.sizing.warm_up, {"scenario": HEATED, "update": 0.01, "motor": None, "lubricant": None, "lubricant_temperature": 25.0, "magnet_coefficient": 0.0, "ambient": 25.0, "winding": 25.0, "housing": 25.0, "heating": None}),
     "to_control": (lm.response.to_control, {"response": RESPONSE, "amplitude": 1.0, "output": "load_speed"}),
     "Simulation": (lm.Simulation, {"drive": SCENARIO, "step": 1e-3, "initial": None, "loaded": None, "given": None, "law": None, "error_bound": False}),
-    "SimulationBatch": (lm.SimulationBatch, {"drives": SCENARIO.drive(), "step": 1e-3, "count": 2, "vary": None, "seed": 0, "threads": 1, "controllers": None, "given_motion": False}),
+    "SimulationBatch": (lm.SimulationBatch, {"drives": SCENARIO.drive(), "step": 1e-3, "count": 2, "vary": None, "seed": 0, "threads": 1, "controllers": None, "given_motion": False, "sensitivities": ()}),
     "Simulation of a train": (lm.Simulation, {"drive": TRAIN, "step": 1e-3, "initial": None, "loaded": ["worm"]}),
     "measure_screw": (lm.test_rig.measure_screw, {"screw": SCREW, "sheet": None, "load": 1000.0, "progress": dangle}),
     "TestRig": (lm.test_rig.TestRig, {"gearbox": SCENARIO.gearbox}),

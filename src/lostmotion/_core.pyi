@@ -547,6 +547,11 @@ class DriveBatch:
     def read(self, variable: int) -> NDArray[numpy.float64]:
         """The values of a variable, by its number among the names."""
 
+    def carry_tangents(self, keys: Sequence[str]) -> None:
+        """Carries along the derivatives of the states by parameters."""
+
+    def tangent(self, parameter: int, state: int) -> NDArray[numpy.float64]: ...
+
     def snapshot(self) -> BatchSnapshot: ...
 
     def restore(self, snapshot: BatchSnapshot) -> None: ...

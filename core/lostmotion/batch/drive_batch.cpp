@@ -1,6 +1,7 @@
 #include "drive_batch.hpp"
 
 #include <algorithm>
+#include <limits>
 #include <span>
 #include <utility>
 
@@ -130,6 +131,7 @@ void DriveBatch::replace(std::size_t k, const model::Train& train) {
         kinds_.push_back(std::move(made));
     else
         kinds_[static_cast<std::size_t>(at->second)] = std::move(made);
+    tangent_walks_.resize(std::min(tangent_walks_.size(), static_cast<std::size_t>(at->second)));
     kind_of_[k] = at->second;
     renew(k);
 }
@@ -157,6 +159,10 @@ void DriveBatch::renew(std::size_t k) {
     const double before = ratio(k), motor_speed = before * x.a, load_speed = x.a - x.v,
                  torque = numbers(k).turned * x.q;
     numbers_[k] = numbers_of(kind(k), train, half_gap_of(k));
+    if (!slopes_.empty()) {
+        sheets_[k] = sheet_of(train, half_gap_of(k));
+        make_tangent_walks();
+    }
     if (ratio(k) != before) {
         x.q = numbers(k).turned * torque;
         x.a = motor_speed / ratio(k);
@@ -192,6 +198,7 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
                             LoadAnswer* answers, Worker& worker) {
     for (std::size_t k = begin; k < end; ++k) {
         ++worker.counts.steps;
+        const DriveState from = drives_[k];
         LoadAnswer* const answer = answers == nullptr ? nullptr : answers + k;
         // The answer of a controller to what its encoders read is that of the general solver.
         const bool walked = !controlled()
@@ -200,8 +207,45 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
         if (!walked && !solve(k, command[k], load_torque[k], answer, worker)) continue;
         times_[k] += step_;
         inputs_[2 * k + 1] = load_torque[k];
+        if (!slopes_.empty()) follow_tangents(k, from);
         show(k);
     }
+}
+
+void DriveBatch::follow_tangents(std::size_t k, const DriveState& from) {
+    constexpr double nan = std::numeric_limits<double>::quiet_NaN();
+    const TangentWalk& walk = *tangent_walks_[static_cast<std::size_t>(kind_of_[k])];
+    for (std::size_t p = 0; p < slopes_.size(); ++p) {
+        DriveTangent& tangent = tangents_[p * size() + k];
+        if (!walk.carry(sheets_[k], slopes_[p], from, inputs_[2 * k], inputs_[2 * k + 1], step_, drives_[k], tangent))
+            tangent = {nan, nan, nan, nan, nan, nan};
+    }
+}
+
+bool DriveBatch::carry_tangents(const std::vector<std::string>& keys) {
+    model::Train first = kinds_[0]->train();
+    for (const std::string& key : keys) {
+        if (key != backlash && model::find_parameter(first, key) == nullptr) return false;
+        DriveSheet slope{};
+        slope.backlash = 1.0;
+        slopes_.push_back(key == backlash ? slope : sheet_slope(first, key));
+    }
+    tangents_.resize(slopes_.size() * size());
+    for (std::size_t k = 0; k < size(); ++k) sheets_.push_back(sheet_of(train_of(k), half_gap_of(k)));
+    make_tangent_walks();
+    return true;
+}
+
+void DriveBatch::make_tangent_walks() {
+    for (std::size_t k = tangent_walks_.size(); k < kinds_.size(); ++k)
+        tangent_walks_.push_back(std::make_unique<const TangentWalk>(*kinds_[k]));
+}
+
+void DriveBatch::read_tangent(std::size_t parameter, std::size_t state, double* out) const {
+    constexpr double DriveTangent::* of[states] = {&DriveTangent::motor_torque, &DriveTangent::motor_speed,
+                                                   &DriveTangent::load_speed, &DriveTangent::twist,
+                                                   &DriveTangent::load_angle};
+    for (std::size_t k = 0; k < size(); ++k) out[k] = tangents_[parameter * size() + k].*of[state];
 }
 
 // False: something was not certain.
@@ -389,6 +433,7 @@ void DriveBatch::reset(const bool* which, const double* start) {
         DriveState& x = drives_[k] = {};
         inputs_[2 * k] = inputs_[2 * k + 1] = times_[k] = 0.0;
         instants_[k] = 0;
+        for (std::size_t p = 0; p < slopes_.size(); ++p) tangents_[p * size() + k] = {};
         std::fill_n(slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k]), slot_count(k), 0.0);
         if (start != nullptr) {
             const double* from = start + k * states;
@@ -408,6 +453,7 @@ void DriveBatch::restore(const Snapshot& s) {
     instants_ = s.instants;
     times_ = s.times;
     slots_ = s.slots;
+    tangents_ = s.tangents;
     for (std::size_t k = 0; k < size(); ++k) {
         drives_[k].known = drives_[k].known && s.changes == changes_;
         show(k);
@@ -465,7 +511,8 @@ void DriveBatch::read_variable(std::size_t variable, double* out) {
 std::size_t DriveBatch::memory() const {
     const std::size_t each = sizeof(DriveState) + 2 * sizeof(int) + sizeof(std::size_t) + sizeof(std::int64_t) +
                              (3 + states + own_.size()) * sizeof(double);
-    return size() * each + numbers_.size() * sizeof(DriveNumbers) + slots_.size() * sizeof(double);
+    return size() * each + numbers_.size() * sizeof(DriveNumbers) + slots_.size() * sizeof(double) +
+           tangents_.size() * sizeof(DriveTangent) + sheets_.size() * sizeof(DriveSheet);
 }
 
 }  // namespace lostmotion::batch

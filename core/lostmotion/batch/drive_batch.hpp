@@ -13,6 +13,7 @@
 
 #include "../scenario/simulation.hpp"
 #include "drive_numbers.hpp"
+#include "drive_tangents.hpp"
 #include "input.hpp"
 #include "team.hpp"
 
@@ -73,6 +74,12 @@ class DriveBatch {
     const ScenarioSimulation::Names& names() const { return names_; }
     void read_variable(std::size_t variable, double* out);
 
+    // From now on, carries along the derivatives of the states with respect to these parameters. They begin at zero.
+    // False: there is no parameter of one of these keys.
+    bool carry_tangents(const std::vector<std::string>& keys);
+    // Of a parameter and a state; NaN after a step whose tangent is not known.
+    void read_tangent(std::size_t parameter, std::size_t state, double* out) const;
+
     struct Snapshot {
         const DriveBatch* of;
         std::vector<DriveState> drives;
@@ -80,8 +87,9 @@ class DriveBatch {
         long changes;
         std::vector<std::int64_t> instants;
         std::vector<double> times, slots;
+        std::vector<DriveTangent> tangents;
     };
-    Snapshot snapshot() const { return {this, drives_, inputs_, changes_, instants_, times_, slots_}; }
+    Snapshot snapshot() const { return {this, drives_, inputs_, changes_, instants_, times_, slots_, tangents_}; }
     void restore(const Snapshot& s);
 
     const Counts& counts() const { return counts_; }
@@ -112,6 +120,8 @@ class DriveBatch {
     double half_gap_of(std::size_t k) const;
     void renew(std::size_t k);
     void spread_numbers();
+    void follow_tangents(std::size_t k, const DriveState& from);
+    void make_tangent_walks();
     const DriveKind& kind(std::size_t k) const { return *kinds_[static_cast<std::size_t>(kind_of_[k])]; }
     const DriveNumbers& numbers(std::size_t k) const {
         return numbers_[each_its_own_ ? k : static_cast<std::size_t>(kind_of_[k])];
@@ -139,6 +149,10 @@ class DriveBatch {
     std::vector<double> slots_;
     std::vector<std::int64_t> instants_;  // of each drive the next sample instant of its controller
     std::vector<double> times_;           // [s]
+    std::vector<DriveSheet> slopes_;      // of the data sheet, by each parameter whose tangents are carried along
+    std::vector<DriveTangent> tangents_;  // of all drives, one parameter after the other
+    std::vector<DriveSheet> sheets_;      // as `numbers_`, where there are tangents
+    std::vector<std::unique_ptr<const TangentWalk>> tangent_walks_;  // of each kind
     std::unique_ptr<const Variables> variables_;
     ScenarioSimulation::Names names_;
     std::vector<std::unique_ptr<Worker>> workers_;

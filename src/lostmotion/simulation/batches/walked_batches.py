@@ -6,14 +6,17 @@ Sampled controllers run at their sample instants, between which the walk steps.
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ... import _core
 from ...errors import InputError
+from ...inputs.validation import did_you_mean
 from ...model.torsion import Rigid, TorsionCurve
 from ..forms.dotted_keys import renamed
+from ..runs.sensitivities import SUFFIX
 from ..scenario.one_gear import drive_keys
 from ..scenario.scenario import Scenario
 from .batch_parameters import BatchParameters
@@ -83,6 +86,37 @@ class WalkedBatch:
         if any(scenario.continuous() for scenario in scenarios):
             return False
         return not any(_error(scenario, scenario) for scenario in dict.fromkeys(scenarios))
+
+    def carry_sensitivities(self, keys: Sequence[str], parameters: BatchParameters) -> None:
+        """Carry along the derivatives of the states with respect to parameters.
+
+        Raises InputError: a key is no number that the core changes by itself, a drive is without that part, or a controller
+        turns the motors.
+        """
+        if self._first.axes():
+            raise InputError(
+                "sensitivities: a controller turns the motor, and what it computes has a derivative, too; lm.simulate takes it into account"
+            )
+        own = {key: renamed(key, self._numbers) for key in keys}
+        for key, number in own.items():
+            if not self._is_number_of_core(number):
+                known = [one for one in (*KEYS, BACKLASH) if self._is_number_of_core(one)]
+                raise InputError(
+                    f"is no number that a batch differentiates by; {did_you_mean(key, known, 'lm.simulate takes every number')}",
+                    f"sensitivities.{key}",
+                )
+            absent = parameters[key] == (1.0 if number.endswith("hysteresis.efficiency") else 0.0)
+            if absent.any() and not number.endswith(("inertia", "viscous_friction")):
+                raise InputError(
+                    f"is {parameters[key][absent][0]:g} for drive {absent.argmax()}, which leaves the part out; give every drive the part",
+                    f"sensitivities.{key}",
+                )
+        self._core.carry_tangents(list(own.values()))
+        for place, name in enumerate(self.states):
+            self._computed[name + SUFFIX] = partial(self._tangents, len(own), place)
+
+    def _tangents(self, count: int, state: int) -> np.ndarray:
+        return np.stack([self._core.tangent(k, state) for k in range(count)])
 
     def change(self, parameters: BatchParameters, keys: Sequence[str], rows: np.ndarray) -> None:
         """Take over what has been written under some keys for some trains."""
