@@ -298,7 +298,7 @@ def test_the_extension_s_stub_is_current(tmp_path: Path) -> None:
     command = [sys.executable, "-m", "nanobind.stubgen", "-q", "-m", "lostmotion._core", "-o", str(tmp_path / "_core.pyi")]
     subprocess.run(command, check=True)
     assert (tmp_path / "_core.pyi").read_text() == (PACKAGE / "_core.pyi").read_text(), "run: make stub"
-    assert core_parameters.stub() == (PACKAGE / "inputs" / "described.pyi").read_text(), "run: make stub"
+    assert core_parameters.stub() == (PACKAGE / "inputs" / "core_parameters.pyi").read_text(), "run: make stub"
 
 
 def test_a_build_of_the_core_that_is_not_there_is_refused() -> None:
