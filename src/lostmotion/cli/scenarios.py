@@ -11,7 +11,7 @@ from .arguments import SourceArgument
 
 
 def scenarios() -> None:
-    """To find a scenario to start from: list those that are shipped.
+    """To find a scenario to start from: list the shipped scenarios.
 
     \b
     lostmotion scenarios

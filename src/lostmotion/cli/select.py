@@ -24,10 +24,10 @@ def select(
     \b
     lostmotion select examples/select-axis.toml -o axis
 
-    Judges each pair by the manufacturers' rules, and tunes and simulates those that pass.
+    Judges each pair by the manufacturers' rules, and tunes and simulates the pairs that pass.
 
-    The task file has the motion, the load and what is wanted; motors and gearboxes are all of the catalogue, or those that it
-    names. Prints the ranking and the reasons for refusal. The runs are kept in the directory given by -o, and an interrupted
+    The task file has the motion, the load and what is wanted; motors and gearboxes are all of the catalogue, or the
+    named ones. Prints the ranking and the reasons for refusal. The runs are kept in the directory given by -o, and an interrupted
     command resumes there. `lostmotion study show DIR -o REPORT` writes a page with the Pareto front.
     """
     from ..studies.selection.task_file import load_task

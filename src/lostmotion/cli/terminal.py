@@ -197,7 +197,7 @@ def busy(what: str) -> Iterator[Callable[[str], None]]:
 def simulating(what: str, scenario: Any, tolerance: float = 0.0) -> Iterator[Callable[[str], None]]:
     """Show a run of a scenario as `busy` does; for more than a minute also an estimate and the progress, on stderr.
 
-    tolerance: relative one of the adaptive solver; 0: that of the run by default.
+    tolerance: relative tolerance of the adaptive solver; 0: the default tolerance of the run.
     """
     from ..simulation.runs.run_time_forecast import forecast
     from ..units.practical import counted

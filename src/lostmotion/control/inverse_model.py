@@ -38,7 +38,7 @@ class InverseModel(InverseModelFields):
 
     ``T_2* = J_Z a + b_Z w + M_Z``, ``M = J_MR i a + b_MR i w + T_2*/i + sgn(i w) (T_10 + kappa M_2B(T_2*)/|i|)`` for the speed w
     and the acceleration a of the reference. With the encoder on the motor its position runs ahead by the twist under T_2*.
-    What is left out here is that of the drive.
+    Parameters that are left out here have the values of the drive.
     """
 
     loss_adaptation: LossAdaptationLaw | None = None

@@ -353,7 +353,7 @@ def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor"
 
 
 def as_torque_source(table: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of `[motor]` without those that only a DC motor has."""
+    """The values of `[motor]` without the keys that only a DC motor has."""
     return {key: value for key, value in table.items() if key not in DC_KEYS}
 
 

@@ -61,7 +61,7 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
 
 
 def _without_replaced(record: LinearSheet, values: dict[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
-    """The values of a record without those that say what a change says in another way."""
+    """The values of a record without the keys that a change replaces in another way."""
     replaced: set[str] = set()
     for ways in record.ALTERNATIVES:
         for way in ways:

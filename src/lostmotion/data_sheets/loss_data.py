@@ -119,7 +119,7 @@ class LossData(Part):
         return self
 
     def all_efficiencies(self) -> tuple[EfficiencyPoint, ...]:
-        """The efficiencies with those that the load correction adds."""
+        """The efficiencies with the ones that the load correction adds."""
         extra = []
         for load, factor in self.load_correction:
             rated = next(p for p in self.efficiency if p.load == 1.0)

@@ -30,7 +30,7 @@ SYNCHRONOUS, DC_EQUIVALENT, TORQUE_SOURCE = "synchronous motor", "DC-equivalent 
 STEPPER = "stepper"
 # What of a brushless motor with block commutation the winding of a synchronous one says in its own ways.
 BLOCK_KEYS = ("rated_voltage", "torque_constant", "resistance", "inductance", "pole_pairs")
-# Data of a stepper alone, and those that it shares with other motors.
+# Data of a stepper alone, and data that it shares with other motors.
 STEPPER_DATA = ("steps_per_revolution", "holding_torque", "detent_torque", "resistance_phase", "inductance_phase")
 SHARED_DATA = ("rotor_inertia", "rated_current", "friction_torque", "max_inertia_ratio", "max_speed")
 
@@ -39,7 +39,7 @@ class MotorSheet(MotorHeat, Record):
     """Data sheet of a DC motor, of a brushless one seen from its supply as a DC motor, of a synchronous one, or of a stepper."""
 
     kind: Literal["dc_brushed", "brushless", "synchronous", "stepper"] = "dc_brushed"
-    """brushless: constants with block commutation, from terminal to terminal; synchronous: those of `winding`"""
+    """brushless: constants with block commutation, from terminal to terminal; synchronous: constants of `winding`"""
     rated_voltage: Annotated[Voltage, Positive] | None = None
     rotor_inertia: Annotated[Inertia, Positive] | None = None
     rated_torque: Annotated[Torque, Positive] | None = None
@@ -248,7 +248,7 @@ class MotorSheet(MotorHeat, Record):
         return self.torque_constant * self.no_load_current
 
     def _field_torque(self) -> float:
-        """M_DR [N·m]: that of the shaft and the friction."""
+        """M_DR [N·m]: the torque of the shaft plus the friction."""
         if self.rated_torque is not None:
             return self.rated_torque + (self._friction() if self.armature_voltage_constant is None else 0.0)
         assert self.torque_constant is not None

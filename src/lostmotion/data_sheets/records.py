@@ -129,7 +129,7 @@ def _entries(data: dict[str, Any], where: str) -> Iterator[Entry]:
         for entry in _tables(data, table, where):
             which = f"{where}: {table} {entry.get('name', '(no name)')}"
             fields = {**common, **entry}
-            for key in ("source", "gap"):  # those of the record, then those of the whole file
+            for key in ("source", "gap"):  # sources and gaps of the record, then of the whole file
                 fields.pop(key, None)
                 fields[f"{key}s"] = [*_tables(entry, key, which), *_tables(data, key, where)]
             yield kind, fields, which
@@ -186,7 +186,7 @@ def _in_file(reference: str, table: str) -> Sheet:
 
 
 def find(reference: str, table: str) -> Sheet:
-    """The record of a name, or one of that kind in a file: the only one (``sheets.toml``), or that of a name (``sheets.toml#name``).
+    """The record of a name, or one of that kind in a file: the only one (``sheets.toml``), or the record of a name (``sheets.toml#name``).
 
     table: a key of `KINDS`, such as ``"gearbox"``.
 

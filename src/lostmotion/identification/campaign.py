@@ -34,7 +34,7 @@ HALF = "locked-ramp-half"  # the smaller loop of a gearbox with hysteresis
 OFF = 1.25  # by which start values are off, so that the logs have to bring them back
 ENCODERS = {"motor_angle": 2 * math.pi / 2**16, "output_angle": 2 * math.pi / 2**22}  # steps [rad]
 TORQUE_NOISE = 2e-3  # of the rated output torque
-LOAD_INERTIA = 2.0  # of the load machine, of that of the gearbox at the output
+LOAD_INERTIA = 2.0  # inertia of the load machine over the gearbox's inertia at the output
 SLOW = 20.0  # times the coefficient of the brake at which the rated torque gives the rated speed, for the ripple
 PHASE_OFF = 0.5  # [rad] by which the start value of the ripple's phase is off
 
@@ -85,7 +85,7 @@ def _triangle(x: np.ndarray) -> np.ndarray:
 
 
 def _rotor(gearbox: Gearbox) -> float:
-    """Inertia of the rig's motor [kg·m²]: that of the gearbox, so that neither hides the other."""
+    """Inertia of the rig's motor [kg·m²]: the gearbox's inertia, so that neither hides the other."""
     if not gearbox.inertia > 0.0:
         raise InputError("the gearbox has no inertia, by which the runs of the rig are chosen; add it")
     return gearbox.inertia

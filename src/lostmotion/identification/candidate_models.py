@@ -60,7 +60,7 @@ class RungResult:
 
     @property
     def error(self) -> float:
-        """Error by which models are compared: that of the logs held out, or else of those fitted."""
+        """Error by which models are compared: the error of the held-out logs, or else of the fitted ones."""
         return self.train if math.isnan(self.held_out) else self.held_out
 
     @property
@@ -90,7 +90,7 @@ def climb(
 ) -> list[RungResult]:
     """Fit all candidate models, one after the other.
 
-    models: those that an interrupted identification has fitted: the search goes on from their values.
+    models: the models that an interrupted identification has fitted: the search goes on from their values.
 
     Raises InputError: no log is left to fit, or the rig has no motion at the start.
     """

@@ -255,7 +255,7 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
 def _begun(
     rig: Rig, logs: list[Prepared], threads: int | None, notify: Notify
 ) -> tuple[Rig, ParameterPoint, Regression, dict[str, str], Collection[str]]:
-    """(rig with a way for each input, where the search begins, why there, words on the inputs, those that runs decide)."""
+    """(rig with a way for each input, where the search begins, why there, words on the inputs, the inputs that runs decide)."""
     rig, ways, undecided = as_recorded(rig, logs)
     point, start = _start(rig, logs, threads)
     train = [log for log in logs if not log.held_out]

@@ -61,7 +61,7 @@ def left_out_errors(
 ) -> list[ConditionError]:
     """Errors of the fitted logs of each condition that ``fit.leave_out`` names, with and without them in the fit.
 
-    logs: all that were fitted or held out; those that were held out take no part.
+    logs: all that were fitted or held out; held-out logs take no part.
     fit: of the model that is taken: the search without some of the logs begins there.
     """
     train = [log for log in logs if not log.held_out]

@@ -97,7 +97,7 @@ class IdentificationResult:
         return next((log.log.channels[self.task.measured[channel].channel].unit for log in self.logs), "")
 
     def error_unit(self, channel: str | None = None) -> tuple[str, float]:
-        """Unit in which errors of a channel are printed, and how many of them one SI unit is; left out, of those that compare models."""
+        """Unit in which errors of a channel are printed, and how many of them one SI unit is; left out, for the models that are compared."""
         first, *more = self.task.measured
         if channel is None and more:
             return "standard deviations", 1.0

@@ -89,7 +89,7 @@ def misfit(function: str, parameters: Iterable[str], given: Iterable[str], probl
     """Error in the names or the number of the arguments of a call.
 
     parameters: names of the arguments that the function has.
-    given: names of those that it was given by name.
+    given: names of the arguments given by name.
     problem: what is wrong with the call if all names are known.
     """
     known = [name for name in parameters if name != "self"]

@@ -29,7 +29,7 @@ class Described(Part):
     core_keys: ClassVar[tuple[str, ...]] = ()  #: keys of those that the core takes
 
     def core_fields(self) -> dict[str, Any]:
-        """Fields for the core, in SI units, without those that are None."""
+        """Fields for the core, in SI units, without the fields that are None."""
         keys = (key for base in reversed(type(self).__mro__) for key in vars(base).get("core_keys", ()))
         return {key: getattr(self, key) for key in keys}
 

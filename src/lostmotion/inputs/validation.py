@@ -84,7 +84,7 @@ def did_you_mean(given: str, choices: Iterable[str], otherwise: str) -> str:
 
 
 def names_like(given: str, names: Iterable[str], otherwise: str, count: int = 3) -> str:
-    """Suggestions as in `did_you_mean`, for names of files and records, of which a part may be missing."""
+    """Suggestions as in `did_you_mean`, for names of files and records; a part of a name may be missing."""
     near = difflib.get_close_matches(given[:MAX_NAME], list(names), n=count, cutoff=0.5)
     return f"did you mean {' or '.join(near)}?" if near else beginning(otherwise)
 
@@ -231,7 +231,7 @@ class _Problem:
         return f"{shown(self.value)} {self._wanted()}"
 
     def _kinds(self, key: str | None = None) -> list[str]:
-        """The kinds that the table may have, or those that have a key, whatever kind it is given."""
+        """The kinds that the table may have, or the kinds that have a key, whatever kind it is given."""
         if key is None:
             kinds = [kind for node in self.nodes for kind in node.get("discriminator", {}).get("mapping", {})]
             if kinds:

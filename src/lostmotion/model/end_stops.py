@@ -38,7 +38,7 @@ class ShaftEndStops(core_parameters.ShaftEndStopsFields):
         return self
 
     def torque(self, angle: float, speed: float = 0.0) -> float:
-        """Torque [N·m] of elastic stops on the shaft at an angle [rad] and a speed [rad/s]; that of rigid ones is a reaction."""
+        """Torque [N·m] of elastic stops on the shaft at an angle [rad] and a speed [rad/s]; the torque of rigid stops is a reaction."""
         for way, end in ((1.0, self.upper), (-1.0, self.lower)):
             if (beyond := way * (angle - end)) > 0.0:
                 return -way * max(0.0, (self.stiffness or 0.0) * beyond + self.damping * way * speed)

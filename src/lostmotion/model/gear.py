@@ -50,7 +50,7 @@ class Gear(Transmission, BetweenShafts):
 
     @kept
     def core_fields(self) -> dict[str, Any]:
-        """Fields for the core, in SI units, without those that are None."""
+        """Fields for the core, in SI units, without the fields that are None."""
         error = self.transmission_error
         return super().core_fields() | self.losses.core_fields() | {"transmission_error": error and error.core()}
 

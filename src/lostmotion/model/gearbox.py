@@ -43,10 +43,10 @@ class Transmission(TransmissionFields):
     """Base of gearboxes and gears of a drive train: ratio, inertia, compliance."""
 
     loss_range: tuple[Annotated[Number, Positive], Annotated[Number, Positive]] | None = None
-    """range of estimated losses: the multiples between which those of such gearboxes lie. No run depends on it; the drive check says which of its verdicts hold at both ends"""
+    """range of estimated losses: the multiples between which the losses of such gearboxes lie. No run depends on it; the drive check says which of its verdicts hold at both ends"""
 
     if TYPE_CHECKING:
-        losses: Any  # of which kinds, each of them says
+        losses: Any  # each class states its kinds
 
     stiffness: Annotated[TorsionCurve | LinearStiffness | Rigid, Field(discriminator="kind")]
     hysteresis: Hysteresis | None = None
@@ -99,7 +99,7 @@ class Transmission(TransmissionFields):
         return self
 
     def core_fields(self) -> dict[str, Any]:
-        """Fields for the core, in SI units, without those that are None."""
+        """Fields for the core, in SI units, without the fields that are None."""
         return super().core_fields() | {
             "stiffness": None if isinstance(self.stiffness, Rigid) else self.stiffness.core(),
             **(

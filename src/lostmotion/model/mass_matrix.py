@@ -59,7 +59,7 @@ class MassMatrix(Part):
         Parameters
         ----------
         shafts : collection of str
-            Names; those that the matrix does not have are ignored.
+            Names; shafts that the matrix does not have are ignored.
 
         Returns
         -------

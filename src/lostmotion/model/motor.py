@@ -59,7 +59,7 @@ class MotorLimits(MotorHeat):
     """resistance of the winding, at 25 °C"""
     torque_constant: Annotated[TorqueConstant, Positive] | None = None
     """torque to one ampere of the armature; with one to an ampere rms of a phase only currents are judged rightly: voltage and heat
-    are R I + k w and R I^2 of a DC motor, and those of a phase take a `winding`"""
+    are R I + k w and R I^2 of a DC motor, and values of a phase require a `winding`"""
     max_voltage: Annotated[Voltage, Positive] | None = None
     """voltage limit of the amplifier of a torque source, for R I + k w with resistance and torque_constant; a DC motor has
     `voltage_limit`"""
@@ -134,7 +134,7 @@ class Motor(MotorFields):
     """
 
     rated_voltage: Annotated[Voltage, Positive] | None = None
-    """u_ZR, that of command 1. A change over a record or a base, by `--set` or in a study is the same motor at another voltage: rated_speed and armature_voltage_constant follow so that stall torque and no-load speed go with the voltage, unless they are given too"""
+    """u_ZR, the voltage of command 1. A change over a record or a base, by `--set` or in a study is the same motor at another voltage: rated_speed and armature_voltage_constant follow so that stall torque and no-load speed go with the voltage, unless they are given too"""
     stall_torque: Annotated[Torque, Positive] | None = None
     """at rated voltage, with no_load_speed in place of rated_speed and armature_voltage_constant; what the shaft gives, if the currents are stated"""
     no_load_speed: Annotated[Speed, Positive] | None = None
@@ -336,7 +336,7 @@ class Motor(MotorFields):
         )
 
     def core_fields(self) -> dict[str, Any]:
-        """Fields for the core of a motor that is not synchronous, in SI units, without those that are None."""
+        """Fields for the core of a motor that is not synchronous, in SI units, without the fields that are None."""
         fields = super().core_fields() | {"kind": self.kind, "command_limit": self.command_limit}
         if self.kind == "stepper" and self.torque_error is None:
             assert self.holding_torque is not None

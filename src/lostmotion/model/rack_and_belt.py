@@ -122,7 +122,7 @@ class RatedBelt(BeltData):
     """
 
     profile: str = ""
-    """such as AT5, GT2 or HTD; with width the ratings are those of manufacturers, where they are not given"""
+    """such as AT5, GT2 or HTD; with width, ratings that are not given come from manufacturers"""
     width: Annotated[Length, Positive] | None = None
     rated_force: Annotated[Force, Positive] | None = None
     """largest force of the tension members in operation"""
@@ -131,10 +131,10 @@ class RatedBelt(BeltData):
     pretension: Annotated[Force, Positive] | None = None
     """force of a strand at rest; left out, the largest circumferential force, so that no strand is slack"""
     teeth_in_mesh: Annotated[Whole, Field(ge=1, le=1000)] | None = None
-    """left out, those of half of the pulley"""
+    """left out, half the teeth of the pulley"""
 
     def meshing(self) -> int | None:
-        """Teeth in mesh; None where neither they nor those of the pulley are known."""
+        """Teeth in mesh; None where neither they nor the pulley's teeth are known."""
         if self.teeth_in_mesh is not None:
             return self.teeth_in_mesh
         return None if self.teeth is None else self.teeth // 2

@@ -315,9 +315,9 @@ def _path(train: DriveTrain, gear: Gear) -> list[str]:
 
 
 def _torques(train: DriveTrain, gear: str, path: list[str], at: Overrunning) -> list[float]:
-    """T_2 of each gear in the steady motion [N·m], to find the segments of their laws. In the gear it is that of the
-    load. On the way from the motor it is the torque of the motor, on the way to the load that of the load, and 0
-    elsewhere."""
+    """T_2 of each gear in the steady motion [N·m], to find the segments of their laws. In the gear it is the torque
+    of the load. On the way from the motor it is the torque of the motor, on the way to the load the torque of the
+    load, and 0 elsewhere."""
     torques = dict.fromkeys(train.gears, 0.0)
     load = math.copysign(at.load_torque, train.gears[gear].ratio)  # the input turns backward
     torques[gear] = load

@@ -304,7 +304,7 @@ class Actuated:
         """Advance the drives over a substep from positions and speeds; the mean acceleration of all joints.
 
         MuJoCo's solver finds the forces of the contacts. It is given the inertia matrix that they feel over the substep:
-        that of the robot, and B = -dtau/da of each drive under the forces found before. Where something switches, this
+        the robot's matrix, and B = -dtau/da of each drive under the forces found before. Where something switches, this
         is repeated until the drives move as the solver predicts.
         """
         mj, m, d, dofs = self._mj, self.model, self.data, self._dofs

@@ -2,8 +2,8 @@
 
 Source: "Simplified dynamic model of the transmission", on the transmission of a passive optoelectronic rangefinder.
 It was written within grant project FT-TA3/103 of the Ministry of Industry and Trade of the Czech Republic, and
-continues Čech and Jevický (2005). Equations and figures are numbered as there. docs/citing.md says what else is known
-of it.
+continues Čech and Jevický (2005). Equations and figures are numbered as there. docs/citing.md has what else is known
+about it.
 """
 
 from __future__ import annotations

@@ -280,7 +280,7 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
 
 
 def _loops(results: Results, rated_twist: float, spring: Any = None) -> Iterator[Panel]:
-    """Torque over twist, or that part of it which is not the spring's."""
+    """Torque over twist, or the part that is not the spring's."""
     rated = _rated_values()[1]
 
     def torque(r: xarray.Dataset) -> Any:

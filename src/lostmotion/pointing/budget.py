@@ -300,7 +300,7 @@ def _cases(scenario: Scenario, *, robustness: bool = True) -> dict[Case, Sequenc
 
 
 def runs_of(scenario: Scenario) -> int:
-    """Number of runs of a budget, without those that find the end of the start-up transient."""
+    """Number of runs of a budget, without the runs that find the end of the start-up transient."""
     return len(_cases(scenario.long()))
 
 

@@ -180,7 +180,7 @@ class _Recording:
         )
 
     def _used(self, formulas: Collection[int]) -> set[int]:
-        """Formulas, and those that they take."""
+        """Formulas, and the formulas that they take."""
         used, waiting = set(formulas), list(formulas)
         while waiting:
             law, *operands, _ = self._tape.formulas[waiting.pop()]

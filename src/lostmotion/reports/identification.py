@@ -214,7 +214,7 @@ def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Gro
     variables = _variables(result)
     spread = [log.name for log in result.logs[:: max(1, len(result.logs) // CLOUDS)]]
     table = residual_table(result, tuple(variables), [*chosen, *spread] if chosen else None)
-    logs = sorted(result.logs, key=lambda log: not log.held_out)  # those that were not fitted say most
+    logs = sorted(result.logs, key=lambda log: not log.held_out)  # held-out logs say most
     if chosen:
         order = list(chosen)
         logs = sorted((log for log in logs if log.name in chosen), key=lambda log: order.index(log.name))

@@ -41,7 +41,7 @@ POINTS: dict[str, Any] = {
 }
 """values of a second method over a line"""
 OTHERS: dict[str, Any] = {"color": MUTED, "linestyle": "none", "marker": "x", "markersize": 4, "alpha": 0.6}
-"""points that are shown beside those that matter"""
+"""points that are shown beside the ones that matter"""
 # The models of the paper.
 STYLES: dict[str, dict[str, Any]] = {
     "2-DOF-NL": {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.7},

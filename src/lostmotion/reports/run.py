@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from .page import Report, Table
 
-# Of more elements than `MANY`, a summary shows those that move, carry or lose most; the page has all.
+# Of more elements than `MANY`, a summary shows the elements that move, carry or lose most; the page has all.
 MANY, SHOWN = 12, 6
 
 

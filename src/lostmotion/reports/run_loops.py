@@ -201,5 +201,5 @@ def points_of(found: list[LoopErrors]) -> list[Point]:
 
 
 def lines_of(found: list[LoopErrors]) -> list[str]:
-    """Lines of a summary, those that do not work first."""
+    """Lines of a summary, failing loops first."""
     return [*(point.sentence for point in points_of(found)), *(line for errors in found for line in errors.lines())]

@@ -17,7 +17,7 @@ from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Pa
 from .thinning import simplified, thinned
 
 WIDTH, HEIGHT = 560.0, 240.0
-NARROW = 380.0  # width of bars and histograms, about that of a card in three columns and on a telephone
+NARROW = 380.0  # width of bars and histograms, about the width of a card in three columns and on a telephone
 LEFT, RIGHT, TOP, BOTTOM = 56.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
 CONSTANT = 1e-9  # relative differences up to which are rounding
@@ -232,7 +232,7 @@ def _curve(curve: Curve, to_x: Scale, to_y: Scale) -> str:
 
 
 def _path(points: np.ndarray) -> str:
-    """Lines between points, but for those that are not finite; far points are kept near the picture."""
+    """Lines between points, but for points that are not finite; far points are kept near the picture."""
     there = np.isfinite(points).all(axis=1)
     ends = np.flatnonzero(np.diff(np.concatenate([[False], there, [False]]).astype(int)))
     words = []

@@ -226,7 +226,7 @@ def _estimated(candidate: RankedCandidate) -> str:
 
 
 def _in_short(candidate: RankedCandidate) -> str:
-    """The same, of those that fit: at the ends of the range of the kind."""
+    """The same, for the fitting ones: at the ends of the range of the kind."""
     holds = candidate.estimated == HOLDS
     return f"losses estimated, the verdict {'holds' if holds else _estimated(candidate)}"
 

@@ -42,7 +42,7 @@ def frame_of(scenario: Scenario) -> tuple[float, int]:
 
 
 def axis_signals(scenario: Scenario) -> Iterator[AxisSignal]:
-    """The variables of the controllers; of windings those that repeat, behind all that the controllers remember."""
+    """The variables of the controllers; repeating states of windings, behind all that the controllers remember."""
 
     def titled(name: str, motor: str) -> str:
         return scenario.train().variable(motor, name)

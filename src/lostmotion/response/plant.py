@@ -38,7 +38,7 @@ class Plant:
     variables: tuple[Variable, ...]  # the channels, and what is derived from them
     derive: Callable[[dict[str, Any], np.ndarray], None]  # adds them to the channels, over time
     output: str  # the variable that is looked at if none is named: the speed of the load
-    angle: str  # angle whose advance over a period is reported: that of the load
+    angle: str  # angle whose advance over a period is reported: the load's
     floors: Mapping[str, float]  # rated magnitudes of the variables by which motions are compared
     scenario: Scenario
     closed: Scenario | None = None  # the scenario, if it has controllers
@@ -184,7 +184,7 @@ def _without_steps(signal: Signal[Any]) -> Signal[Any]:
 
 
 def known_output(output: str, known: Sequence[str]) -> str:
-    """The name of an output, if it is one of those that are known."""
+    """The name of an output, if it is a known one."""
     if output not in known:
         raise InputError(f"output {shown(output)} is not known; it must be one of {listed(known)}")
     return output

@@ -159,7 +159,7 @@ def periodic_motion(
 
 
 def _replaced(plant: Plant, given: Mapping[str, Any]) -> dict[str, Signal[Any]]:
-    """The inputs of a plant, with those that are given in place of its own."""
+    """The inputs of a plant, with the given ones in place of its own."""
     out = dict(plant.signals)
     for word, value in given.items():
         if value is not None:

@@ -23,7 +23,7 @@ from .tuning_data import inertias
 if TYPE_CHECKING:
     from ..simulation.runs.results import RunArrays
 
-STEPPED = ("current", "speed", "position")  # loops that a reference can step; that of i_d has none of its own
+STEPPED = ("current", "speed", "position")  # loops that a reference can step; the loop of i_d has none of its own
 HALVINGS = 12  # of a step, until no limit acts on it
 STEP_SHARE = 0.02  # of the longest move, the first size of a position step
 MAX_POINTS = 4000  # of a step response

@@ -212,7 +212,7 @@ def aligned(rows: list[tuple[str, str, str]]) -> list[str]:
 
 
 def differences(old: Any, new: Any, key: str) -> Iterator[tuple[str, tuple[Any, Any]]]:
-    """Values that differ between nested tables, by dotted key; those that are removed first."""
+    """Values that differ between nested tables, by dotted key; keys that are removed first."""
     if not isinstance(old, Mapping) or not isinstance(new, Mapping):
         if old != new:
             yield key, (old, new)

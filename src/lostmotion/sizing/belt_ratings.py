@@ -85,7 +85,7 @@ def tooth_shares(profile: str, rpm: np.ndarray) -> np.ndarray | None:
 
 
 def widths(belt: RatedBelt) -> list[float]:
-    """Widths of the profile and pitch of a belt of which a sheet is in the catalogue [m]."""
+    """Widths of the profile and pitch of a belt for which the catalogue has a sheet [m]."""
     sheets = (sheet for sheet in _sheets(_spelling(belt.profile)) if _fits(sheet, belt))
     return sorted({sheet.width for sheet in sheets if sheet.width is not None})
 

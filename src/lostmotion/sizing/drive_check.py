@@ -43,8 +43,8 @@ def check_drive(scenario: Scenario) -> Findings:
 
     The scenario is run. Loads, speeds, voltage, current and heat are taken from that run, over the duty cycle of
     `task.cycle`, or with the motion repeated without a pause. Limits are `gearbox.limits` and `motor.limits` (records
-    of the catalogue include theirs) and the limits of `task`. Rules without a limit are reported as unknown, and so are those
-    that this train gives no answer to, with the reason.
+    of the catalogue include theirs) and the limits of `task`. Rules without a limit are reported as unknown, and so
+    are rules that do not apply to this train, with the reason.
 
     Parameters
     ----------

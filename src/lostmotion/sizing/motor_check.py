@@ -211,7 +211,7 @@ def voltage(
 
 
 def amperes_of(m: Motor, where: str) -> str:
-    """Addition to a current whose amperes only a torque constant tells: those of rms, of a peak or of dc."""
+    """Addition to a current whose amperes only a torque constant tells: rms, peak or dc amperes."""
     return f", in the amperes of {where}.limits.torque_constant" if m.kind != "dc" and m.winding is None else ""
 
 

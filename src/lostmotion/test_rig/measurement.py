@@ -74,7 +74,7 @@ def measure(
     Returns
     -------
     RigReport
-        Measured values beside those of the data sheet, and the curves.
+        Measured values beside the values of the data sheet, and the curves.
 
     Raises
     ------

@@ -78,7 +78,7 @@ def measure_screw(
     Parameters
     ----------
     screw
-        Its values, such as those of a scenario.
+        Its values, such as the values of a scenario.
     sheet
         Data to compare with.
     load

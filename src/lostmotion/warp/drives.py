@@ -36,7 +36,7 @@ class Drives:
     dtype
         ``"float32"`` or ``"float64"``.
     device
-        Device of Warp, such as ``"cuda:0"`` or ``"cpu"``; default: that of Warp.
+        Device of Warp, such as ``"cuda:0"`` or ``"cpu"``; default: Warp's.
     seed
         Seed of the generator that the functions in `vary` get.
 

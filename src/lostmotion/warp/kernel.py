@@ -1,4 +1,4 @@
-"""The walk of the core as kernels of Warp. Its text is that of the core; this file says which arrays they read and write."""
+"""The walk of the core as kernels of Warp. The text is taken from the core; this file says which arrays they read and write."""
 
 # mypy: disable-error-code="valid-type, untyped-decorator, no-untyped-def"
 

@@ -39,7 +39,7 @@ def course_of(x: np.ndarray) -> str:
 
 
 def as_recorded(rig: Rig, logs: Sequence[Prepared]) -> tuple[Rig, dict[str, str], dict[str, Way]]:
-    """(rig with a way for each input, words on those that the task leaves open, those that samples alone do not decide)."""
+    """(rig with a way for each input, words on the inputs that the task leaves open, the inputs that samples alone do not decide)."""
     ways: dict[str, Way] = {}
     words: dict[str, str] = {}
     undecided: dict[str, Way] = {}

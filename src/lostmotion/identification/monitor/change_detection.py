@@ -30,12 +30,12 @@ import numpy as np
 
 from ...errors import need
 
-SIZES = (1.0, 3.0, 10.0)  # prior standard deviations of a change, in those of the series
+SIZES = (1.0, 3.0, 10.0)  # prior standard deviations of a change, relative to the series
 RAMPS = (1, 30, 300)  # values within which a change is complete; 1: a step
 CONFIRMED = 2  # values in a row with evidence above the limit: one value that is wrong makes no alarm
 POWER = 1.2816  # 90 % point of the normal distribution
 CREDIBLE = 0.95  # of the instant at which a change began, and of the present value
-RECENT = 10  # values at the end, of which the present one is the mean if nothing changes
+RECENT = 10  # values at the end; the present value is their mean if nothing changes
 LARGEST = 40.0  # deviations of a step, beyond which a series is too short for finding it
 
 Direction = Literal["up", "down", "both"]
@@ -170,7 +170,7 @@ def _present(
 
 
 def _at_end(rows: _Rows, first: int, d: np.ndarray) -> tuple[float, float]:
-    """(value at the end at the mean conditions, its deviation in those of the series) if a change has the course d.
+    """(value at the end at the mean conditions, its deviation relative to the series) if a change has the course d.
 
     first: first value behind the baseline that is used; the baseline gives the effect of the conditions.
     """

@@ -57,7 +57,7 @@ class MonitorResult:
     left_out: dict[str, str] = field(default_factory=dict)
     """by log that cannot be used: why"""
     noise: dict[str, tuple[float, str]] = field(default_factory=dict)
-    """by channel without a stated deviation: that of the residuals of the baseline, with its SI unit"""
+    """by channel without a stated deviation: the deviation of the baseline's residuals, with its SI unit"""
     inputs: list[str] = field(default_factory=list)
     """course of inputs between samples, if the task leaves it open, with the reason"""
 
@@ -223,7 +223,7 @@ def monitor_logs(rig: Rig, logs: Sequence[Prepared], *, notify: Notify | None = 
 
 
 def _with_courses(rig: Rig, parts: Sequence[Prepared]) -> tuple[Rig, list[str]]:
-    """(rig with a course of each input between samples, words on those that the task leaves open), by the first logs."""
+    """(rig with a course of each input between samples, words on the inputs that the task leaves open), by the first logs."""
     rig, words, undecided = as_recorded(rig, parts)
     if undecided:
         reference, some = _at_start(rig), [replace(part, held_out=False) for part in parts[:FIRST]]
@@ -260,7 +260,7 @@ class _Reference:
     rung: int
     values: Mapping[str, float]
     free: Mapping[str, FreeParameter]
-    deviations: np.ndarray | None  # deviations of the residuals of the measured channels, SI; None: by those of the log
+    deviations: np.ndarray | None  # deviations of the residuals of the measured channels, SI; None: the log's
     given: bool  # whether the task states them, so that residuals are in units of them
 
 

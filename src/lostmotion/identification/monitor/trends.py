@@ -208,7 +208,7 @@ class _Series:
 
 
 def _variances(values: np.ndarray, deviations: np.ndarray, count: int) -> np.ndarray:
-    """Relative variances: those of the logs, and the one that their values have beyond these (DerSimonian and Laird 1986)."""
+    """Relative variances: the variances of the logs, and the variance of their values beyond them (DerSimonian and Laird 1986)."""
     s2 = deviations**2
     if not np.all(s2 > 0.0):
         return np.ones(len(values))

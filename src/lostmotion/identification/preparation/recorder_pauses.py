@@ -196,7 +196,7 @@ def _taylor(time: np.ndarray, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _initial(
     task: Identification, shown: Restart, delay: float, value: np.ndarray, error: np.ndarray
 ) -> dict[str, FormulaText]:
-    """Formulas of the state by dotted key: that of the cubic, through the scale, the offset and the delay of the channel."""
+    """Formulas of the state by dotted key: the state of the cubic, through the scale, the offset and the delay of the channel."""
     m = task.measured[shown.channel]
 
     def state(order: int, offset: FormulaText, name: str) -> str:

@@ -1,4 +1,4 @@
-"""The logs of a task: those that can be used, and of the others why not."""
+"""The logs of a task: the usable logs, and the reasons why the others are not usable."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _refuse_conditions(rig: Rig, logs: Sequence[Prepared]) -> None:
 
 
 def distinct_names(paths: list[Path]) -> list[str]:
-    """Names of files; of those that have theirs twice, with the directories that tell them apart."""
+    """Names of files; duplicate names come with the directories that tell them apart."""
     names = [path.name for path in paths]
     depth = 1
     while len(set(names)) < len(names) and depth < max(len(path.parts) for path in paths):

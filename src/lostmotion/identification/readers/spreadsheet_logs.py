@@ -150,7 +150,7 @@ class _Part:
         parser.EndElementHandler = self._end
         parser.CharacterDataHandler = self._text
         parser.StartDoctypeDeclHandler = self._refuse
-        with suppress(expat.ExpatError):  # openpyxl reports those that it needs
+        with suppress(expat.ExpatError):  # openpyxl reports the errors in parts that it needs
             while piece := stream.read(PIECE):
                 parser.Parse(piece)
             parser.Parse(b"", True)

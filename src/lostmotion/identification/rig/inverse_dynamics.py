@@ -102,7 +102,7 @@ def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, sh
     for gear in train.gears.values():
         n = ratios[gear.input]
         inertia, viscous = inertia + n**2 * gear.inertia, viscous + n**2 * gear.viscous_friction
-    for _, damper in train.couplings():  # those that hold are refused
+    for _, damper in train.couplings():  # couplings that hold are refused
         viscous += (ratios[damper.input] - ratios[damper.output]) ** 2 * damper.viscous_friction  # type: ignore[attr-defined]
     for name, motor in train.motors.items():
         n = ratios[motor.shaft]

@@ -94,7 +94,7 @@ class LogInputs:
         return numbers_of_input(self._task, name, known)
 
     def _samples(self, name: str, known: Mapping[str, Any]) -> tuple[int, int, bool]:
-        """First and last of those that act between begin and end, and whether the first comes late: beside a value of a
+        """First and last of the values that act between begin and end, and whether the first comes late: beside a value of a
         parameter they are the same.
         """
         time = self._log.time + (self._numbers(name, known)[DELAY] - self._begin)

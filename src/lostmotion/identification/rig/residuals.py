@@ -56,7 +56,7 @@ class Engine:
         """Residuals of each log, weighted, one row for each measured channel, SI; NaN if the rig has no motion,
         0 where the log has no number.
 
-        derivatives: parameters of which `jacobians` is likely to be asked next at this point: their derivatives add a
+        derivatives: parameters whose `jacobians` is likely to be asked next at this point: their derivatives add a
             tenth to a run.
         """
         requests = [(log, point.of(log)) for log in logs]

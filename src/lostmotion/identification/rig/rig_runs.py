@@ -77,7 +77,7 @@ def run_logs(
         for channels in dict.fromkeys(c.channels for c in waiting):
             alike = [c for c in waiting if c.channels == channels]
             order = {id(c.train): k for k, c in reversed(list(enumerate(alike)))}
-            alike.sort(key=lambda c: order[id(c.train)])  # those of one train one after the other
+            alike.sort(key=lambda c: order[id(c.train)])  # runs of one train one after the other
             try:
                 rows = run_cases([c.case for c in alike], list(channels), threads, signals=False)
             except InputError as problem:

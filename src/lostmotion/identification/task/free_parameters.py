@@ -30,7 +30,7 @@ class FreeParameter(Part):
     min: Number = 0.0  #: least value
     max: Number = math.inf  #: largest value
     unit: str = ""
-    """in which results show it, and of the kind of which its texts are; numbers in the file are in SI all the same"""
+    """unit in which results show it, whose kind its texts have; numbers in the file are in SI all the same"""
     scale: Number | None = None
     """a change that matters; left out, a tenth of the start value, or of the range where that is 0"""
     tolerance: Number | None = None

@@ -96,7 +96,7 @@ class Rung(Part):
     name: str
     free: tuple[str, ...] = ()  #: parameters, beside those of the models before
     set: dict[str, Any] = Field(default_factory=dict)
-    """values of the scenario by dotted key, beside those of the models before"""
+    """values of the scenario by dotted key, beside the values of the models before"""
     multi_start: Elements[tuple[Number, ...]] = Field(default_factory=nothing)
     """values to try of parameters on which the motion does not depend smoothly, SI or text with a unit"""
 
@@ -117,8 +117,8 @@ class FitOptions(Part):
     regression: Switch = True
     """start values by linear regression of inverse dynamics, where the rig allows it and its runs are nearer to the logs"""
     horizon: tuple[Annotated[Time, Positive], ...] = ()
-    """lengths of windows, rising: the logs are fitted in windows of the first, each run of which begins at the angle and the speed
-    measured there, then of the next, and at last whole"""
+    """lengths of windows, rising: the logs are fitted in windows of the first length, then of the next, and at last
+    whole; each run begins at the angle and the speed measured there"""
     sample_interval: Annotated[Time, Positive] | None = None
     """sample interval of the runs behind a channel with a filter; default: the interval of the log, at most 2 ms"""
 

@@ -149,7 +149,7 @@ def resting_on(
 ) -> list[Undetermined]:
     """Dependence on the value of a parameter that is not free, if the logs do not determine it to within its scale.
 
-    parameters: those that are free, and this one as the last.
+    parameters: the free ones, and this one as the last.
     normal: J'WJ of the scaled parameters.
     """
     names = list(parameters)

@@ -49,7 +49,7 @@ class Misfit:
         return self.ratio > LARGE
 
     def text(self, unit: str, factor: float) -> str:
-        """Misfit as a sentence, with errors in a unit of which one SI unit has so many."""
+        """Misfit as a sentence, with errors in a unit; one SI unit has so many of it."""
         found, rms = [], factor * self.rms
         if self.large:
             stated = f"{rms / self.ratio:.4g} {unit}".rstrip()

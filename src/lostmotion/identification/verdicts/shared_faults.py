@@ -94,7 +94,7 @@ def shared_faults(
 ) -> list[SharedFault]:
     """Faults of the model's kind that several logs share.
 
-    logs: all logs, those that disagree with the others included.
+    logs: all logs, with the logs that disagree with the others.
     point: values with which candidates are tried.
     """
     found = []

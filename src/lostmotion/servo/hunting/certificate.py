@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     import xarray
 
 POINTS = 121  # of the map
-SAMPLED_POINTS = 33  # of that of a sampled controller
+SAMPLED_POINTS = 33  # of the map of a sampled controller
 SHOWN = 4.0  # times the largest limit cycle, up to which it is drawn
 SECANTS = 12
 STEP = 1e-4  # relative, of the derivative at a fixed point

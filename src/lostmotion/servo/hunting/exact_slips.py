@@ -205,7 +205,7 @@ class Slips:
         return found
 
     def _slipped(self, before: Pieces) -> list[Pieces]:
-        """Pieces that go on slipping over a tick, and those that stop in it."""
+        """Pieces that go on slipping over a tick, and pieces that stop in it."""
         contact, way = self.contact, before.mode
         bend = bend_of(contact, before)
         after = before.moved(contact.slip, way[:, None] * contact.push)
@@ -216,7 +216,7 @@ class Slips:
             return [after]
         some = after.take(unsure)
         going = some.where(self.speed, np.zeros(len(some)), some.mode)
-        # The starts of those that stop are the same.
+        # The starts of the stopping pieces are the same.
         stops = before.take(unsure)
         radius = some.radius[:, 1]
         row = self.contact.slip[1]

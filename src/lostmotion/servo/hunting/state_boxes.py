@@ -64,7 +64,7 @@ class Boxes(Sets):
         )
 
     def widen(self, state: int, low: np.ndarray, high: np.ndarray) -> None:
-        """Add an unknown between two values to a state; those that stops have added are merged before."""
+        """Add an unknown between two values to a state; unknowns that stops have added are merged before."""
         n = self.centre.shape[1]
         merged = np.abs(self.spread[:, :, UNKNOWNS:]).sum(axis=2)
         self.spread[:, :, UNKNOWNS:] = 0.0
@@ -198,7 +198,7 @@ class BoxFollower:
     # --- between samples ---
 
     def _slipped(self, boxes: Boxes) -> list[Boxes]:
-        """Boxes that go on slipping over a tick, and those that stop in it."""
+        """Boxes that go on slipping over a tick, and boxes that stop in it."""
         contact, way = self.contact, boxes.mode
         after = boxes.moved(contact.slip, way[:, None] * contact.push)
         speed = np.eye(len(contact.held))[1]

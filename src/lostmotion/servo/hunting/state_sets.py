@@ -43,7 +43,7 @@ class Sets:
 
 
 def propagated(contact: SampledSlip, sets: Any, slipped: Callable[[Any], list[Any]]) -> Any:
-    """Sets after a tick, those that slip by a function of their kind."""
+    """Sets after a tick; slipping sets go through a function of their kind."""
     sets.came[:] = 0
     still = sets.mode == 0
     if not still.any():
@@ -56,7 +56,7 @@ def propagated(contact: SampledSlip, sets: Any, slipped: Callable[[Any], list[An
 
 
 def freed_within(contact: SampledSlip, before: Any, after: Any) -> list[Any]:
-    """Sets that stay stuck over a tick, or the rest of one, and those that break away; the torque is monotonic within a tick."""
+    """Sets that stay stuck over a tick, or the rest of one, and sets that break away; the torque is monotonic within a tick."""
     one, two = before.range_of(contact.held), after.range_of(contact.held)
     stays = (two[0] < contact.breakaway) & (two[1] > -contact.breakaway)
     parts = [after.take(stays)]

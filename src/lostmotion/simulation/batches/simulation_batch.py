@@ -191,7 +191,7 @@ class SimulationBatch:
 
     @property
     def variables(self) -> tuple[str, ...]:
-        """Names of the variables, each of which ``batch[name]`` returns."""
+        """Names of the variables that ``batch[name]`` returns."""
         return self._core.variables
 
     @checked

@@ -57,7 +57,7 @@ def check_continuous(reference: PositionReference | SlideReference, unit: str) -
 def motion_given(name: str, values: Any, units: Mapping[str, str] = UNITS) -> dict[str, float]:
     """Given motion at the end of a step, in SI.
 
-    units: of what may be given: those of a shaft, or of a slide.
+    units: of what may be given: units of a shaft, or of a slide.
 
     Raises InputError: there is no speed among it, or something else.
     """

@@ -123,7 +123,7 @@ def _check(key: str, given: Iterable[str], known: Iterable[str], what: str) -> N
 def angles_at_start(
     train: DriveTrain, given: Mapping[str, float], twists: Mapping[str, float], driven: Collection[str] = ()
 ) -> dict[str, float]:
-    """The angles of all shafts [rad], from those that are given through the gears to the others.
+    """The angles of all shafts [rad], from the given angles through the gears to the others.
 
     driven: names of the shafts whose motion is given, which are at 0 before others are.
 

@@ -61,7 +61,7 @@ class LostSteps:
 def lost_steps(result: xarray.Dataset) -> tuple[LostSteps, ...]:
     """Return the steps that each stepper of a run has lost.
 
-    A rotor slips where it falls more than two full steps behind its field, half a period. The next rest of it is four steps away.
+    A rotor slips where it falls more than two full steps behind its field, half a period. The next rest is four steps away.
 
     Parameters
     ----------

@@ -27,9 +27,8 @@ if TYPE_CHECKING:
     import xarray
 
 
-ENERGY = tuple(_core.energy_entries())
+ENERGY = tuple(_core.energy_entries())  # entries of the energy ledger
 FRAME_SAMPLES = 100_000  # of a run whose dataset is made quickly; what is kept for that holds its time axis
-"""entries of the energy ledger"""
 
 
 def installed_version() -> str:

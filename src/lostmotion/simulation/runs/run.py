@@ -125,7 +125,7 @@ def simulate(
     Returns
     -------
     xarray.Dataset or RunArrays
-        The variables of `lostmotion.simulation.VARIABLES`, or those of the elements of the train, over ``time`` [s]. The attributes
+        The variables of `lostmotion.simulation.VARIABLES`, or the variables of the elements of the train, over ``time`` [s]. The attributes
         contain the end state, the scenario and, if it was computed, the energy ledger.
 
     Raises

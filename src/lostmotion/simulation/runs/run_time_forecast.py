@@ -29,7 +29,7 @@ class Forecast(NamedTuple):
 def forecast(scenario: Scenario, tolerance: float = 0.0) -> Forecast:
     """Estimate the length of a run. That takes a fiftieth of its time, or some tenths of a second.
 
-    tolerance: relative one of the adaptive solver; 0: that of the run by default.
+    tolerance: relative tolerance of the adaptive solver; 0: the default tolerance of the run.
 
     Raises SolverError: the motion has no continuation.
     """

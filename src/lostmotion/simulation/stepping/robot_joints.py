@@ -180,7 +180,7 @@ def _check_commands(name: str, scenario: Scenario) -> None:
 
 
 def output_of(name: str, train: DriveTrain) -> str:
-    """The end of the train, which moves no other shaft: that of a joint; of several the one with the name of the joint."""
+    """The end of the train, which moves no other shaft: the shaft of a joint; of several the one with the name of the joint."""
     joined = [(gear.input, gear.output) for gear in train.gears.values()]
     joined += [(one, other) for one, other, _ in train.held_together()]
     inner, turned = (

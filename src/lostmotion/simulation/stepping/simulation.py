@@ -58,11 +58,11 @@ class Simulation(SimulationAnswers):
     step
         The usual interval [s]; any other is possible, this one is fastest.
     initial
-        State at t = 0; default that of the scenario, or rest.
+        State at t = 0; default: the state of the scenario, or rest.
     loaded
-        Names of the shafts of a train that a load torque may act on; default those of the scenario, of a train alone all.
+        Names of the shafts of a train that a load torque may act on; default: the loaded shafts of the scenario, of a train alone all.
     given
-        Names of the shafts of a train whose motion `advance` is given; default those of the scenario that have a speed.
+        Names of the shafts of a train whose motion `advance` is given; default: the shafts of the scenario that have a speed.
     law
         As of `simulate`.
     error_bound

@@ -386,8 +386,8 @@ class Axes:
         return whole, int(made.result.attrs["switching_count"])
 
     def _after_run(self, row: np.ndarray, made: Repeated, winding: float) -> list[Finding]:
-        """The same rules, of the cycle that was run, and the temperature of its winding [°C]; those that only the required motion
-        has are of that."""
+        """The same rules, of the cycle that was run, and the temperature of its winding [°C]; rules that only the
+        required motion has are taken from it."""
         here, task, slides, result = made.cycles.last, self.task, self.study.slides_itself(row), made.result
         duty, m = made.duty, made.scenario.motor
         command, torque, speed = (result[name][here] for name in ("command", "motor_torque", "motor_speed"))
@@ -429,7 +429,7 @@ class Axes:
 
 
 def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
-    """The pairs of a piece: first the rules for all of them, then the runs of those that pass, on several threads."""
+    """The pairs of a piece: first the rules for all of them, then the runs of the pairs that pass, on several threads."""
     n = len(parameters)
     rows: list[ResultRow | None] = [None] * n
     errors, switchings = [""] * n, np.zeros(n)

@@ -20,7 +20,7 @@ from .tabulated_runs import tabulate, units_of
 if TYPE_CHECKING:
     import pyarrow as pa
 
-SLOW_RUNS = 20  # in a piece of those that are made one by one
+SLOW_RUNS = 20  # in a piece of runs that are made one by one
 MAX_NUMBERS = 2**23  # of samples that are held at once: 64 megabytes
 
 

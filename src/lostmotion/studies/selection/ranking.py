@@ -35,7 +35,7 @@ class RankedCandidate:
     not_judged: str  # rules of the drive check that have no limit to compare with
     values: dict[str, float]  # values of the objectives
     tightest: str = ""  # the rule of the drive check whose limit is used most, and its share
-    ran: bool = True  # whether it was run: of a task, those that the rules refuse are not
+    ran: bool = True  # whether it was run: of a task, runs that the rules refuse are not
     estimated: str = ""  # verdict over the range of losses, if the gearbox of a task has estimated ones
     choice: dict[str, float] = field(default_factory=dict)
     """mass, length, price and lead time of the pair of a task, as far as they are known"""
@@ -72,7 +72,7 @@ class Price:
 
 
 def candidates(table: pa.Table, study: Study) -> list[RankedCandidate]:
-    """Rank the runs of a study that selects. Runs that fit come first, then those that violate one limit, two, ...,
+    """Rank the runs of a study that selects. Runs that fit come first, then runs that violate one limit, two, ...,
     each from the best to the worst. Runs that failed come last.
 
     Raises ValueError: the study has no table `[select]`.

@@ -402,7 +402,7 @@ def _apart(controller: dict[str, Any]) -> tuple[AnyCurrent | None, dict[str, Any
 
 
 def _vary(tables: dict[str, Any], directory: Path) -> list[Any]:
-    """Varied values: those of the file, else all records of parts that the file does not name or write out."""
+    """Varied values: the records of the file, else all records of parts that the file does not name or write out."""
     entries = tables.get("vary")
     if entries is None:
         kinds = ("motor",) if "slide" in tables and "gearbox" not in tables else ("gearbox", "motor")

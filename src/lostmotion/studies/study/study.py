@@ -484,7 +484,7 @@ class Study(Part):
         return {name: read_expression(text, self.vocabulary) for name, text in self.keep.items()}
 
     def _grids(self) -> list[list[int]]:
-        """Places in `vary` that are combined with each other: all, or of a task those of pairs, then each kind of whole drive."""
+        """Places in `vary` that are combined with each other: all, or for a task the keys of pairs, then each kind of whole drive."""
         places = {k: v.all_keys[0] for k, v in enumerate(self.vary)}
         if self.axis is None:
             return [list(places)]
