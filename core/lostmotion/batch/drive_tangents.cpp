@@ -2,6 +2,7 @@
 
 #include <array>
 #include <bit>
+#include <compare>
 #include <cmath>
 
 #include "../model/drive_train.hpp"
