@@ -18,6 +18,19 @@ from lostmotion.cli import app as lm_app
 from lostmotion.simulation.forms.train_tables import TrainTables
 
 
+def test_the_first_identification_prints_what_the_page_shows() -> None:
+    page = (ROOT / "docs" / "identification.md").read_text()
+    file, shown = re.findall(r"```toml\n(.*?)```", page, re.S)[0], re.findall(r"```text\n(.*?)```", page, re.S)[0]
+    assert file == (ROOT / "examples" / "wear" / "identify.toml").read_text()
+    command, *lines = shown.splitlines()
+    done = lostmotion(*shlex.split(command.removeprefix("$ lostmotion ")), cwd=ROOT)
+    assert done.returncode == 0, done.stderr
+    assert [line for line in lines if line.strip() != "..." and line not in done.stdout.splitlines()] == []
+    found = lm.identify(ROOT / "examples" / "wear" / "identify.toml")
+    assert found.values == pytest.approx({"friction": 0.1, "viscous": 0.02}, rel=0.03)  # of which the logs were made
+    lm.simulate(found.scenario.replace(**{"command.drive": {"mean": 0.2}}))
+
+
 def test_the_tutorial_can_be_followed(tmp_path: Path) -> None:
     page = (ROOT / "docs" / "tutorial.md").read_text()
     sheet, drive, changed = re.findall(r"```toml\n(.*?)```", page, re.S)

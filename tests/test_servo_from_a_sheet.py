@@ -67,3 +67,15 @@ def test_a_file_without_loops_is_tuned_and_the_load_without_friction_floats_in_t
 def test_without_gains_the_option_that_finds_them_is_named(axis: Path) -> None:
     done = CliRunner().invoke(app, ["servo", str(axis)])
     assert "controller.position.gain: no gain is given; add it, or find it: --tune margins" in str(done.exception)
+
+
+def test_the_margins_hold_in_the_position_loop_too_where_its_encoder_sees_the_resonance(axis: Path) -> None:
+    """With the usual gain of the position loop this axis is unstable at 27.7 Hz, the resonance of gearbox and load."""
+    on_load = {"controller.position_encoder": {"shaft": "load", "bits": 20}, "load.viscous_friction": 2.0}
+    loops = {"controller.position": {"gain": 42.62}, "controller.speed": {"gain": 0.2647, "integral_gain": 26.54}}
+    usual = lm.load(axis, on_load | loops)
+    tuned = lm.tune(usual, rule="margins")
+    assert tuned.position_gain < 0.5 * 42.62
+    rows = [row.margins for row in lm.commission(tuned.scenario).loops if row.loop == "position"]
+    assert all(m.stable and not m.phase_margin < 1.047 and not m.gain_margin < 10.0**0.3 for m in rows)
+    assert any(m.gain_margin < 10.0**0.35 for m in rows)  # and no more is given up than a tenth of the gain

@@ -296,8 +296,8 @@ def _held(moves: Moves, rest: AtRest, seen: _Seen, window: float) -> Settling:
     after = seen.during(end)
     time, error = seen.time[after], seen.error[after]
     late = error[3 * len(error) // 4 :] if seen.covers else to - np.array(rest.range)
-    worst = float(late[np.abs(late).argmax()])
-    if rest.verdict == "at rest" and seen.covers:
+    worst, rests = float(late[np.abs(late).argmax()]), rest.verdict == "at rest"
+    if rests and seen.covers:
         worst = float(error[-1])
         if abs(to - rest.range[1] - worst) > SAME * window:
             rest = replace(rest, verdict="not decided", reason="rounding decides between two motions")
@@ -312,7 +312,7 @@ def _held(moves: Moves, rest: AtRest, seen: _Seen, window: float) -> Settling:
         state, reason = _within(moves, rest, time - end, error, window, covers=seen.covers)
     within = within if state.startswith("settled") else math.nan
     swing = 0.0
-    if rest.verdict != "at rest":
+    if not rests:
         swing = _swing(time, error, LATER) if seen.covers else 0.5 * float(np.ptp(late))
     return Settling(end, to, state, within, True, reason, worst, float(seen.unseen[-1]), swing)
 

@@ -44,6 +44,7 @@ RULES = (
     "search",
 )
 GOALS = ("bandwidth", "stiffness")
+SMALLER, STEPS = 0.9, 60  # share of a gain of the position loop that is tried next, and how many are
 LITTLE = math.radians(30.0)  # phase margin below which a rule has a comment
 ZERO = 4.0  # K_p/J over the zero K_i/K_p of the PI controller, by `margins`
 SPAN = (1e-3, 1.0)  # of J/T_lag: the gains of the speed loop that are tried
@@ -179,6 +180,9 @@ def tune(
             if axis.controller.position is None
             else rounded(position_gain(_lowest_bandwidth(_with(axis, gains, None), "speed")))
         )
+    if rule == "margins" and K_v is not None:
+        K_v, note = _position_by_margins(axis, gains, K_v, asked["phase_margin"], asked["gain_margin"])
+        why += note
     kept = SpeedGains(_as_in_files(gains.gain), _as_in_files(gains.integral_gain), gains.filter_time)
     if rule not in ("margins", "search"):
         why = f"{why}; {_reached(_with(axis, gains, K_v))}"
@@ -327,6 +331,19 @@ def _by_margins(axis: Axis, phase: float, gain: float, bandwidth: float | None) 
         )
     K_p = rounded(kept)
     return SpeedGains(K_p, K_p * K_p / (ZERO * J)), f"phase margin {what} kept in {counted(len(points), 'regime')}"
+
+
+def _position_by_margins(axis: Axis, speed: SpeedGains, K_v: float, phase: float, gain: float) -> tuple[float, str]:
+    """The gain of the position loop, or a smaller one that keeps the margins: an encoder on the load sees the resonance."""
+    points = regimes(axis)
+    for tried in K_v * SMALLER ** np.arange(STEPS):
+        if _least(_with(axis, speed, float(tried)), points, ("position",)).spare(phase, gain) >= 0.0:
+            note = "" if tried == K_v else f", K_v {tried / K_v:.2g} of its usual value for them"
+            return rounded(float(tried)), note
+    text = (
+        f"no gain of the position loop keeps {math.degrees(phase):.4g} degrees and a gain margin of {_decibels(gain)}"
+    )
+    raise InputError(f"{text}; ask for less, or close the loop with the encoder of the motor", "phase_margin")
 
 
 def _by_search(axis: Axis, goal: str, peak: float) -> tuple[SpeedGains, str, float | None]:
