@@ -316,8 +316,8 @@ def test_samples_of_a_large_train_are_right_though_matrices_are_given_up_between
 # --- random trains with gears that lock themselves ---
 
 
-def run_locking(number: int, stiffness: float | None = None) -> Any:
-    tables = locking_train(1, number, stiffness)
+def run_locking(number: int, stiffness: float | None = None, seed: int = 1) -> Any:
+    tables = locking_train(seed, number, stiffness)
     return lm.simulate(lm.Scenario(**{key: table for key, table in tables.items() if table}))
 
 
@@ -338,6 +338,46 @@ def test_speeds_that_come_to_nothing_in_ever_shorter_times_are_at_rest() -> None
             # Angles, since the teeth of a stiff mesh still rattle.
             angle = np.cumsum(speed)
             assert np.abs(np.cumsum(soft[name].values) - angle).max() < share * np.abs(angle).max()
+
+
+def test_a_group_that_locks_stops_no_other_whose_damper_might_free_it() -> None:
+    """The mesh of two shafts comes to overrun; two others turn on beyond a soft mesh, with more inertia than locks."""
+    angles = [np.array([r[f"s{k}_angle"].values for k in range(4)]) for r in (run_locking(101, k, 77) for k in (None, 1e7, 1e9))]
+    rigid, *soft = angles
+    off = [np.abs(s - rigid).max() / np.abs(rigid).max() for s in soft]
+    assert off[1] < min(0.02, 0.5 * off[0])
+
+
+def test_torques_at_rest_after_a_stop_do_not_depend_on_the_last_bit() -> None:
+    """Four shafts on three rigid gears stop at once, and go on to hold the torques that they had."""
+    tables = locking_train(78, 193)
+    before, *after = (
+        {name: at_end(run, f"{name}_output_torque") for name in ("x1", "x2", "x3")}
+        for end in (0.28374, 0.2838, 0.285, 0.297, 0.31, 0.34, 0.38)
+        for run in [
+            lm.simulate(lm.Scenario(**{k: v for k, v in tables.items() if v}).replace(simulation={"duration": end, "sample_interval": end}))
+        ]
+    )
+    for torques in after:
+        assert torques == pytest.approx(before, rel=1e-3)
+        assert torques == pytest.approx(after[0], rel=1e-11)
+
+
+def test_a_wedge_that_gives_way_leaves_others_at_rest() -> None:
+    """Motor and load turn a gear the same way, which holds T up to M i/|eta_b|; a brake behind a spring holds more gears."""
+    tables = {key: table for key, table in locking_train(79, 23).items() if table}
+    scenario = lm.Scenario(**tables)
+    gear, motor = scenario.gears["x1"], scenario.command["m"].mean
+    losses, i = gear.losses, gear.ratio
+    instant = float(lm.switchings_of(lm.simulate(scenario))["instant"].values[0])
+    result = lm.simulate(scenario.replace(simulation={"duration": instant + 1e-6, "sample_interval": 1e-6}))
+    load = at_end(result, "s1_load_torque")
+    assert load == pytest.approx(motor * i / losses.backdrive_efficiency, rel=1e-4)
+    inertias = [scenario.shafts[name].inertia for name in ("s0", "s1")]
+    share = 1.0 / (i * losses.drive_efficiency)
+    rate = (motor - load * share) / (inertias[0] + inertias[1] / i * share)
+    assert at_end(result, "s0_speed") == pytest.approx(rate * 1e-6, rel=1e-3)
+    assert at_end(result, "s2_speed") == 0.0
 
 
 @pytest.mark.parametrize("number", [130, 280])

@@ -11,6 +11,7 @@
 #include <utility>
 #include <vector>
 
+#include "lostmotion/base/decimal.hpp"
 #include "variables.hpp"
 
 namespace lostmotion::fmu {
@@ -179,8 +180,8 @@ class Instance {
         if (!(std::isfinite(interval) && interval >= 1e-12 && interval <= 1e12))
             return failed("the communication step must lie between 1e-12 s and 1e12 s");
         if (!(std::isfinite(from) && std::fabs(from - time()) <= 1e-3 * interval + 1e-9 * std::fabs(from)))
-            return failed("the communication point is " + std::to_string(from) + " s, but the FMU is at " +
-                          std::to_string(time()) + " s");
+            return failed("the communication point is " + general_text(from, 9) + " s, but the FMU is at " +
+                          general_text(time(), 9) + " s");
         if (const Ended e = apply(); e != ok) return e;
         end_ = inputs_;
         for (std::size_t k = 0; k < end_.size(); ++k) end_[k] += rates_[k] * interval;

@@ -99,7 +99,7 @@ Fault TrainCheck::elements() const {
         const Fault name = named("gears", "gear", g.name, k);
         if (g.law.ratio == 0.0) return name + "has the ratio 0; it must not be 0";
         if (g.efficiencies && !(g.efficiencies->driving() > 0.0))
-            return name + "has a drive efficiency of " + std::to_string(g.efficiencies->driving()) +
+            return name + "has a drive efficiency of " + general_text(g.efficiencies->driving(), 6) +
                    "; it must be > 0: no torque would turn it";
         if (Fault error = flanks(g, name); !error.empty()) return error;
         if (g.mesh_damping > 0.0 && g.rigid()) return name + "is rigid and has mesh damping; give it a stiffness";
@@ -154,7 +154,8 @@ Fault TrainCheck::mesh_stiffness(const Gear& g, const Fault& name) const {
         return name + "has a mesh stiffness over the angle and no stiffness, which it scales; give it one";
     for (int k = 0; k < mesh.pieces(); ++k)
         if (!(mesh.value(k) > 0.0) || !std::isfinite(mesh.value(k)))
-            return name + "has a mesh stiffness of " + std::to_string(mesh.value(k)) + " times its own; it must be > 0";
+            return name + "has a mesh stiffness of " + general_text(mesh.value(k), 6) +
+                   " times its own; it must be > 0";
     return too_fine(name + "with its mesh stiffness ", mesh.pieces());
 }
 
@@ -174,7 +175,7 @@ Fault TrainCheck::impacts(const Fault& name, const std::string& rigid, const std
         return !o.has_dry_losses() && o.law.losses == Gearbox::constant_efficiency && o.law.efficiency == 1.0;
     };
     if (!(restitution >= 0.0 && restitution <= 1.0))
-        return name + rigid + " and a restitution of " + std::to_string(restitution) + "; it must lie from 0 to 1";
+        return name + rigid + " and a restitution of " + general_text(restitution, 6) + "; it must lie from 0 to 1";
     for (std::size_t k = 0; k < train_.gears.size(); ++k)
         if (const Gear& o = train_.gears[k]; (o.rigid() || o.strikes()) && !lossless(o))
             return named("gears", "gear", o.name, k) + "is rigid and has losses, which impacts in " + name +
@@ -195,8 +196,8 @@ Fault TrainCheck::what_strikes() const {
         const EndStops& e = train_.end_stops[k];
         const Fault name = named("end_stops", "end stops", e.name, k);
         if (!(e.upper > e.lower))
-            return name + "have their upper stop at " + std::to_string(e.upper) + ", not above the lower one at " +
-                   std::to_string(e.lower) + "; exchange them";
+            return name + "have their upper stop at " + general_text(e.upper, 6) + ", not above the lower one at " +
+                   general_text(e.lower, 6) + "; exchange them";
         if (e.stiffness == 0.0)
             if (Fault error = impacts(name, "are rigid", "them", e.restitution); !error.empty()) return error;
         if (e.damping > 0.0 && places.shafts[static_cast<std::size_t>(e.shaft)].massless != nowhere)

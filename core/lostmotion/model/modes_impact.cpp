@@ -292,13 +292,19 @@ Found SwitchedTrain::locks(Instant& now, const Event& event, const Instant& past
     std::vector<std::size_t> may;
     for (std::size_t g = 0; g < train().gears.size() && may.size() < most_at_once; ++g)
         if (train().gears[g].may_lock() && locks_in_motion(moving, event, from, g)) may.push_back(g);
+    // One of them is where the old regime does not hold any more: a stop elsewhere might free it by what a damper does.
+    std::size_t near = 0;
+    const Flags fails = parts_that_fail(moving, event, from);
+    const std::vector<int> part = parts_at(event);
+    for (std::size_t k = 0; k < may.size(); ++k)
+        if (fails[part[train().gears[may[k]].input]]) near |= std::size_t{1} << k;
     // As few as can be. Of several ways it is only known where they end the same.
     for (std::size_t many = 1; many <= may.size(); ++many) {
         Instant stopped = now;
         Key stopped_key = key;
         bool some = false, differ = false;
         for (std::size_t set = 1; set < std::size_t{1} << may.size(); ++set) {
-            if (static_cast<std::size_t>(std::popcount(set)) != many) continue;
+            if (static_cast<std::size_t>(std::popcount(set)) != many || (near != 0 && (set & near) == 0)) continue;
             now = moving;
             MovedShafts moved{};
             std::vector<Flags> joined(may.size());
@@ -326,6 +332,25 @@ Found SwitchedTrain::locks(Instant& now, const Event& event, const Instant& past
         if (some) return differ ? Found::inconsistent : Found::yes;
     }
     return Found::inconsistent;
+}
+
+// Parts of the train, by `parts_at`, in which a contact or the loss law of a gear leaves a regime.
+Flags SwitchedTrain::parts_that_fail(const Instant& now, const Event& event, const Key& from) {
+    const SparseRegime& r = regimes_[from];
+    const std::vector<int> part = parts_at(event);
+    SparseFlow along(r.rate, now, room_);
+    Flags fails;
+    for (std::size_t g = 0; g < r.guards.size(); ++g) {
+        const Guard& guard = r.guards[g];
+        const auto [value, size] = sized(guard.form, now);
+        if (value > clear_of_zero * size + r.near_event[g] || sign_after(along, guard.form, value, size).sign >= 0)
+            continue;
+        if (guard.is_of_contact()) fails[part[places().contacts[guard.contact].a]] = true;
+        for (std::size_t k = 0; k < train().gears.size() && guard.branch != nowhere; ++k)
+            if (guard.branch == places().gears[k].cell || guard.branch == places().gears[k].cell_back)
+                fails[part[train().gears[k].input]] = true;
+    }
+    return fails;
 }
 
 // The contact of the gear that is to be named where no combination of modes is consistent: a given motion drives it

@@ -66,9 +66,12 @@ Key SwitchedTrain::follow(const Instant& now, const Instant& before, const Event
         for (int c = 0; c < contacts(); ++c)
             for (int m = 0; m < 3; ++m) before_change[c][m] = first[c][m] + way * (last[c][m] - first[c][m]);
     }
-    // What stops may hold more than it took.
+    // What stops may hold more than it took, or be kept at rest by what is stuck.
+    const Ties ties = places().ties(end.modes);
     for (int c = 0; c < contacts(); ++c)
-        if (begin.modes[c] != end.modes[c] && event.stopped[c] && holds_more_[c]) end.modes[c] = 0;
+        if (begin.modes[c] != end.modes[c] && event.stopped[c] &&
+            (holds_more_[c] || kept_at_rest(places().contacts[c], ties)))
+            end.modes[c] = 0;
     return end;
 }
 
@@ -93,7 +96,8 @@ auto SwitchedTrain::first_failure(const Key& begin, const Key& end, Conditions& 
                 fails = {c, turns && low < 0.0 ? begin.modes[c] : mode, way};
             } else if (std::isinf(least_fall) && high < low && high < 0.0) {
                 const double zero = std::fmax(way, low / (low - high));
-                if (zero < fails.way) fails = {c, mode, zero};
+                // Of those that fail at once, to rounding, the first.
+                if (zero < (fails.contact == nowhere ? 1.0 : fails.way - tiny)) fails = {c, mode, zero};
             }
         }
     }

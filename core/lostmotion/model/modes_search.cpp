@@ -519,8 +519,10 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
             return !event.at_rest[v.contact] || modes.modes[v.contact] == v.mode;
         });
         if (violations.empty() && trial.found == Found::inconsistent) violations = of_neighbours(modes, event);
-        std::sort(violations.begin(), violations.end(), [](const Violation& a, const Violation& b) {
-            return a.order != b.order ? a.order < b.order : a.relative > b.relative;
+        // Contacts that are tied together are violated alike, to rounding: then by their order.
+        std::stable_sort(violations.begin(), violations.end(), [](const Violation& a, const Violation& b) {
+            const auto share = [](const Violation& v) { return static_cast<float>(v.relative); };
+            return a.order != b.order ? a.order < b.order : share(a) > share(b);
         });
         path.push_back(tried.size());
         tried.push_back({modes, std::move(violations)});

@@ -123,6 +123,11 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
         result.end = nullptr;
     }
     if (result.found != Found::inconsistent || !event.from_each_load) return result;
+    // Where the first walk says of no contact that it has to change, the next that does leads on.
+    const auto walk_from = [&](const Key& other) {
+        const bool wanted = violated.each != nullptr && violated.each->empty();
+        return walk(now, event, other, key, wanted ? violated : Violated{});
+    };
     // The torque that keeps a twist at rest depends on the cell, and the cell on the torque.
     std::vector<std::size_t> at_rest;
     for (std::size_t g = 0; g < train().gears.size(); ++g) {
@@ -139,7 +144,7 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
                 if (half == 1 && gear.efficiencies) continue;
                 Key other = trial;
                 other.branch[places().gears[g].cell] = static_cast<std::int16_t>(gear.loss_cell(middle, v) ^ half);
-                const Trial again = walk(now, event, other, key);
+                const Trial again = walk_from(other);
                 if (again.found == Found::yes) return again;
                 result.turns_back = result.turns_back || again.turns_back;
             }
@@ -155,7 +160,7 @@ auto SwitchedTrain::settle(Instant& now, const Key& modes, const Event& event, K
         }
         Key other = trial;
         locate_losses(now, T_2, other);
-        const Trial again = walk(now, event, other, key);
+        const Trial again = walk_from(other);
         if (again.found == Found::yes) return again;
         result.turns_back = result.turns_back || again.turns_back;
     }

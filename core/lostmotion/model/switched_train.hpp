@@ -174,6 +174,7 @@ class SwitchedTrain {
     bool close(Instant& now, const Impulses& struck, int contact, const Event& event, const Instant& past,
                const Key& from, Key& key);
     Found locks(Instant& now, const Event& event, const Instant& past, Key& key);
+    Flags parts_that_fail(const Instant& now, const Event& event, const Key& from);
     int jams(const Instant& now, const Event& event, const Key& from);
     bool locks_in_motion(const Instant& now, const Event& event, const Key& from, std::size_t gear);
     enum class Slowed { stopped, joined, impossible };

@@ -25,23 +25,22 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
 def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
     """Refuses a train with rigid flanks or end stops that strike, for what takes motions without impacts."""
     if isinstance(scenario, Scenario):
-        gears = scenario.gears_by_key()
+        train, gears, in_file = scenario.train(), scenario.gears_by_key(), scenario.key_in_file
     else:
-        gears = {f"gears.{name}": gear for name, gear in scenario.gears.items()}
+        train, gears, in_file = scenario, {f"gears.{name}": gear for name, gear in scenario.gears.items()}, str
     for key, gear in gears.items():
         if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
+            remedy = "a stiffness" if key.startswith(("screws.", "racks.", "belts.")) else 'a stiffness of the kind "curve"'
             raise InputError(
-                f"{function}: {key}.stiffness has rigid flanks with backlash, and this takes no impacts; give a stiffness to the "
-                'backlash, kind = "curve"'
+                f"{function}: {in_file(key)} has rigid flanks with backlash, and this takes no impacts; give it {remedy} in place of "
+                "the restitution"
             )
-    train = scenario.train() if isinstance(scenario, Scenario) else scenario
     for key, coupling in train.couplings():
         if coupling.strikes:
-            raise InputError(f"{function}: {key} strikes, and this takes no impacts; take a freewheel in its place")
+            raise InputError(f"{function}: {in_file(key)} strikes, and this takes no impacts; take a freewheel in its place")
     for name, shaft in train.shafts.items():
         if shaft.end_stops is not None and shaft.end_stops.stiffness is None:
-            key = f"{'slides' if train.is_slide(name) else 'shafts'}.{name}.end_stops"
-            key = scenario.key_in_file(key) if isinstance(scenario, Scenario) else key
+            key = in_file(f"{'slides' if train.is_slide(name) else 'shafts'}.{name}.end_stops")
             raise InputError(f"{function}: {key} are rigid, and this takes no impacts; give them a stiffness")
 
 
