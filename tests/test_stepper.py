@@ -279,7 +279,7 @@ def test_lost_steps_of_random_rotors_are_those_of_an_integration(seed: int) -> N
         torque=load,
         viscous=viscous,
         duration=until,
-        sample_interval=until / 400,
+        sample_interval=until / 20,
         torque_error=1e-6 * T_H,
     )
     (found,) = lm.simulation.lost_steps(lm.simulate(scenario))
@@ -293,6 +293,43 @@ def test_lost_steps_of_random_rotors_are_those_of_an_integration(seed: int) -> N
     exact = solve_ivp(rate, (0.0, until), [0.0, 0.0], "DOP853", rtol=1e-12, atol=1e-13, max_step=until / 400, events=slips)
     assert len(found.times) == exact.t_events[0].size
     assert np.array(found.times) == pytest.approx(exact.t_events[0], abs=1e-5 * until)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_lost_steps_of_random_axes_are_those_of_an_integration_from_step_to_step(seed: int) -> None:
+    """Rotor and load on a gear, fields that jump by full steps: number, way and instants of slips, however far apart the samples are."""
+    draw = np.random.default_rng(100 + seed)
+    J_L, k, c, b = J * float(draw.uniform(0.5, 4.0)), N * T_H * float(draw.uniform(1.0, 10.0)), 1e-3, 3e-3
+    speed, acceleration, until = float(draw.uniform(20.0, 40.0)), float(draw.uniform(0.9, 2.0)) * T_H / (J + J_L), 0.1
+    gear = {"input": "motor", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": k}, "mesh_damping": c}
+    scenario = lm.Scenario(
+        shafts={"motor": {"inertia": 0.0}, "load": {"inertia": J_L, "viscous_friction": b}},
+        motors={"m": {"shaft": "motor", **MOTOR, "torque_error": 1e-7 * T_H}},
+        gears={"g": gear},
+        command={"m": {"stepping": {"reference": {"moves": [{"to": 1.5}], "speed": speed, "acceleration": acceleration}}}},
+        simulation={"duration": until, "sample_interval": 2e-3},
+    )
+    (found,) = lm.simulation.lost_steps(lm.simulate(scenario))
+    steps = [(t, v) for t, v, _ in scenario.signals()["m_command"].breakpoint_list() if t < until]
+    x, slips, period = np.zeros(4), [], 0
+    for (begin, field), end in zip(steps, [*(t for t, _ in steps[1:]), until], strict=True):
+
+        def rate(_, y, field=field):
+            mesh = k * (y[0] - y[1]) + c * (y[2] - y[3])
+            return [y[2], y[3], (-T_H * math.sin(N * (y[0] - field)) - mesh) / J, (mesh - b * y[3]) / J_L]
+
+        def passes(_, y, field=field):
+            return math.cos(0.5 * N * (y[0] - field))
+
+        now = math.floor(N * (x[0] - field) / (2.0 * math.pi) + 0.5)
+        slips += [(begin, int(math.copysign(1, now - period)))] * abs(now - period)
+        run = solve_ivp(rate, (begin, end), x, "DOP853", rtol=1e-12, atol=1e-13, events=passes)
+        slips += [(t, 1 if y[2] > 0.0 else -1) for t, y in zip(run.t_events[0], run.y_events[0], strict=True)]
+        x = run.y[:, -1]
+        period = math.floor(N * (x[0] - field) / (2.0 * math.pi) + 0.5)
+    assert list(found.slips) == [way for _, way in slips]
+    assert np.array(found.times) == pytest.approx([t for t, _ in slips], abs=2e-6)
+    assert found.lost == 4 * abs(period)
 
 
 def test_a_run_that_loses_steps_does_not_fit() -> None:

@@ -270,7 +270,7 @@ class _Axis:
                 changes[table] = Named(changes[table])
         made = Scenario.of(tables.model_copy(update=changes))
         result = run(made, energy=False)
-        (lost,) = (found for found in found_in(made, result) if found.motor == self.name)
+        (lost,) = (found for found in found_in(made, result, as_sampled=True) if found.motor == self.name)
         late = np.asarray(result["time"]) >= first
         field = np.asarray(result["time"]) * speed
         lag = (np.asarray(result[train.variable(shaft, "angle")]) - field)[late] / self.motor.full_step
