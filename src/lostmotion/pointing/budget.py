@@ -23,6 +23,7 @@ from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario
+from ..simulation.variables_of_trains import angle_of_run
 from ..worker_threads import thread_pool
 from .causes import CAUSES, VARIANTS, present, without
 from .robustness import ROBUSTNESS, SPEEDS
@@ -371,7 +372,7 @@ def _errors(scenario: Scenario, result: RunArrays) -> OneRun:
             ratio = turns(train, train.motors[motor].shaft, shaft)
             assert ratio is not None
             counted = result[train.variable(motor, "command")] / ratio
-            place = result[train.variable(shaft, "angle")]
+            place = angle_of_run(train, shaft, result)
             measured[motor] = place - place[0] - (counted - counted[0])
             continue
         controller = scenario.axes()[motor]

@@ -20,6 +20,7 @@ from ..model.train import DriveTrain
 from ..simulation.runs.pointing_error import pointed
 from ..simulation.runs.run import run
 from ..simulation.scenario.scenario import Scenario
+from ..simulation.variables_of_trains import angle_of_run
 
 if TYPE_CHECKING:
     import xarray
@@ -263,7 +264,7 @@ def _motor(train: DriveTrain, motor: str | None) -> str:
 
 def _of(data: xarray.Dataset, train: DriveTrain, shaft: str) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Time, angle and speed of a shaft, or position and speed of a slide."""
-    return data["time"].values, data[train.variable(shaft, "angle")].values, data[train.variable(shaft, "speed")].values
+    return data["time"].values, angle_of_run(train, shaft, data), data[train.variable(shaft, "speed")].values
 
 
 def _window(

@@ -102,6 +102,18 @@ def angle_terms(train: DriveTrain, shaft: str, recorded: Container[object]) -> d
     return {}
 
 
+def angle_of_run(train: DriveTrain, shaft: str, result: Any) -> np.ndarray:
+    """The angle of a shaft over a run, from those that the run has.
+
+    Raises InputError: it does not follow from them.
+    """
+    if not (terms := angle_terms(train, shaft, result)):
+        raise InputError(
+            f"the angle of {shaft} does not follow from those that the train keeps; make it the last of its shafts"
+        )
+    return np.asarray(sum(factor * np.asarray(result[name]) for name, factor in terms.items()))
+
+
 def angle_through(gear: Gear, angle: Any, twist: Any, *, forward: bool) -> Any:
     """The angle at the other side of a gear, forward at its output: twist = input angle/ratio - output angle - transmission error.
 

@@ -10,10 +10,9 @@ import numpy as np
 
 from ...inputs.arguments import checked
 from ...model.motor import Motor
-from ...model.train import DriveTrain
 from ...reproducible import sin
 from ..scenario.scenario import Scenario
-from ..variables_of_trains import angle_terms
+from ..variables_of_trains import angle_of_run
 from .results import RunArrays, scenario_of
 from .run import run
 
@@ -111,16 +110,11 @@ def found_in(
         time, speed = (np.asarray(result[key]) for key in ("time", train.variable(motor.shaft, "speed")))
         field = scenario.signals()[train.variable(name, "command")]
         lines = np.array(field.breakpoint_list())
-        course = _Course(time, _angle(train, motor.shaft, result), speed, lines, field.sine_list(), motor.full_step)
+        course = _Course(
+            time, angle_of_run(train, motor.shaft, result), speed, lines, field.sine_list(), motor.full_step
+        )
         found.append(course.lost(name))
     return tuple(found)
-
-
-def _angle(train: DriveTrain, shaft: str, result: xarray.Dataset | RunArrays) -> np.ndarray:
-    """Angle of a shaft over a run [rad], from the angles that the run has."""
-    return np.asarray(
-        sum(factor * np.asarray(result[name]) for name, factor in angle_terms(train, shaft, result).items())
-    )
 
 
 def _close(scenario: Scenario, result: xarray.Dataset | RunArrays) -> xarray.Dataset | RunArrays:

@@ -8,6 +8,7 @@ import numpy as np
 
 from ...control.references import PositionReference, SlideReference
 from ..scenario.scenario import Scenario
+from ..variables_of_trains import angle_of_run
 from .results import RunArrays
 
 NAME = "pointing_error"
@@ -40,7 +41,7 @@ def pointing_errors(scenario: Scenario, result: RunArrays) -> dict[str, np.ndarr
     """
     found = {}
     for motor, name in pointing_names(scenario):
-        place = _angle(scenario, result, pointed(scenario)[motor][1])
+        place = angle_of_run(scenario.train(), pointed(scenario)[motor][1], result)
         found[name] = target(scenario, motor, result.time, float(place[0])) - place
     return found
 
@@ -52,12 +53,3 @@ def target(scenario: Scenario, motor: str, time: np.ndarray, start: float) -> np
     if scenario.train().motors[motor].kind == "stepper":
         wanted = start + wanted - float(reference.at(np.zeros(1))[0][0])
     return wanted
-
-
-def _angle(scenario: Scenario, result: RunArrays, shaft: str) -> np.ndarray:
-    train = scenario.train()
-    name = train.variable(shaft, "angle")
-    if name in result:
-        return result[name]
-    (gear,) = train.gears.values()  # of a drive, whose results have no angle of the motor
-    return np.asarray(gear.ratio * (result["load_angle"] + result["twist"]))

@@ -30,14 +30,18 @@ def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
         train, gears, in_file = scenario, {f"gears.{name}": gear for name, gear in scenario.gears.items()}, str
     for key, gear in gears.items():
         if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
-            remedy = "a stiffness" if key.startswith(("screws.", "racks.", "belts.")) else 'a stiffness of the kind "curve"'
+            remedy = (
+                "a stiffness" if key.startswith(("screws.", "racks.", "belts.")) else 'a stiffness of the kind "curve"'
+            )
             raise InputError(
                 f"{function}: {in_file(key)} has rigid flanks with backlash, and this takes no impacts; give it {remedy} in place of "
                 "the restitution"
             )
     for key, coupling in train.couplings():
         if coupling.strikes:
-            raise InputError(f"{function}: {in_file(key)} strikes, and this takes no impacts; take a freewheel in its place")
+            raise InputError(
+                f"{function}: {in_file(key)} strikes, and this takes no impacts; take a freewheel in its place"
+            )
     for name, shaft in train.shafts.items():
         if shaft.end_stops is not None and shaft.end_stops.stiffness is None:
             key = in_file(f"{'slides' if train.is_slide(name) else 'shafts'}.{name}.end_stops")
