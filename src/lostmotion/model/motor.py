@@ -356,7 +356,7 @@ class Motor(MotorFields):
         """Heat of both phases of a stepper at its rated current, 2 R I² [W]; None if it is not known."""
         if self.resistance_phase is None or self.rated_current is None:
             return None
-        return 2.0 * self.resistance_phase * self.rated_current**2
+        return 2.0 * self.resistance_phase * self.rated_current * self.rated_current
 
     @property
     def unloaded_speed(self) -> float:
