@@ -223,7 +223,9 @@ class MovesReference(Reference[V], Generic[V, S, A, J, M]):
             needed = ("speed", "acceleration") if move.duration is None else ("law",)
             lacking = [key for key in needed if self._of(move, key) is None]
             if lacking:
-                raise ValueError(f"lacks {lacking[0]} of moves[{k}]; give it there, or beside moves for all of them")
+                such = '; such as "modified_sine"' if lacking[0] == "law" else ""
+                text = f"lacks {lacking[0]} of moves[{k}]; give it there, or beside moves for all of them{such}"
+                raise ValueError(text)
         positions = [self.start, *(move.to for move in moves)]
         for k, (begin, end) in enumerate(self.intervals()):
             resolved = math.ulp(end) <= SHORTEST * (end - begin) < math.inf

@@ -198,7 +198,8 @@ def _check(rule: str, given: Mapping[str, Any]) -> None:
         if key == "goal" and value not in GOALS:
             raise InputError(f"{shown(value)} is not known; take {' or '.join(GOALS)}", key)
         if key == "phase_margin" and not 0.0 < value < 0.5 * math.pi:
-            raise InputError(f"{value:g} rad must lie between 0 and 90 degrees", key)
+            hint = f'; did you mean "{value:g} deg"?' if 0.5 * math.pi < value < 90.0 else ""
+            raise InputError(f"{value:g} rad must lie between 0 and 90 degrees{hint}", key)
         least = 1.0 if key in ("gain_margin", "sensitivity_peak") else 0.0
         if key != "goal" and not value > least:
             usual = "" if OF_RULES[key][0] is None else f"; {OF_RULES[key][0]:g} is usual"
