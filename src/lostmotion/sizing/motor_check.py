@@ -12,6 +12,7 @@ from ..control.controller import Controller
 from ..control.loops import FirstOrderCurrent
 from ..model.motor import Motor
 from ..units.practical import ROUNDING, RPM, told_apart
+from .catalogue_formulas import WARM
 from .duty_cycle import DutyCycle
 from .finding import Finding, Judgement, within
 from .thermal import TwoBodies, mean_square, steady_rise
@@ -81,14 +82,16 @@ def heat(
             cycle=cycle,
         )
     ]
-    if limits is None or limits.max_winding_temperature is None or m.copper_loss() is None:
-        return findings
-    permissible = limits.max_winding_temperature
-    if rise is None:
-        rise = _rise(m, cycle, torque, ambient)
-    if rise is None:
-        return findings
     what = "winding temperature"
+    permissible = None if limits is None else limits.max_winding_temperature
+    if rise is None and permissible is not None:
+        rise = _rise(m, cycle, torque, ambient)
+    if permissible is None or rise is None or m.copper_loss() is None:
+        if ambient <= WARM:
+            return findings
+        lacks = f"{where}.limits.max_winding_temperature is" if permissible is None else "its resistances are"
+        remark = f"{lacks} missing, and ratings hold up to {WARM:.0f} °C, not at {ambient:.3g} °C"
+        return [*findings, Finding("winding_temperature", what, "not judged", "unknown", remark)]
     if math.isinf(rise):
         remark = "the current is far too large to last"
         return [
