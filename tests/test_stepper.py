@@ -132,7 +132,10 @@ def test_a_step_rate_beyond_that_of_the_driver_is_refused() -> None:
     [
         ({"steps_per_revolution": 202}, "multiple of 4"),
         ({"holding_torque": None}, "lacks holding_torque"),
-        ({"torque_error": 1e-12}, "allow more"),
+        ({"torque_error": 1e-12}, "2e-08 to 0.05 of its holding_torque"),
+        ({"torque_error": T_H}, "2e-08 to 0.05 of its holding_torque"),
+        ({"detent_torque": 1.1 * T_H}, "below its holding_torque"),
+        ({"rated_torque": 2.0}, "of no use to a stepper; give holding_torque"),
         ({"voltage_limit": 3.0, "rated_voltage": 3.0}, "of no use to a stepper"),
     ],
 )

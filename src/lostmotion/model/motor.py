@@ -113,6 +113,7 @@ STEPPER_KEYS = (
 # Share of the holding torque, for 16 straight lines in a quarter of a period: microsteps up to 1/16 do not end at a corner.
 USUAL_TORQUE_ERROR = 8.04e-4
 LEAST_TORQUE_ERROR = 2e-8  # share of the holding torque; less takes more straight lines than the core has room for
+LARGEST_TORQUE_ERROR = 0.05  # the same: of a quarter of a period in two lines
 # Keys of a DC motor known by its line from stall to no load, in place of its rated point.
 LINE_KEYS = ("stall_torque", "no_load_speed")
 CURRENT_KEYS = ("stall_current", "no_load_current")
@@ -211,10 +212,18 @@ class Motor(MotorFields):
                     raise ValueError(
                         f"lacks {key}, which its supply_voltage needs; leave supply_voltage out for an ideal current"
                     )
-        if self.torque_error is not None and self.torque_error < LEAST_TORQUE_ERROR * self.holding_torque:
+        if self.rated_torque != type(self).model_fields["rated_torque"].default:
+            raise ValueError("has rated_torque, of no use to a stepper; give holding_torque")
+        if self.detent_torque is not None and self.detent_torque >= self.holding_torque:
             raise ValueError(
-                f"has torque_error = {self.torque_error:g} N*m, less than {LEAST_TORQUE_ERROR:g} of its holding_torque; allow more"
+                f"has detent_torque = {self.detent_torque:g} N*m, which must be below its holding_torque, {self.holding_torque:g} N*m"
             )
+        if self.torque_error is not None:
+            share = self.torque_error / self.holding_torque
+            if not LEAST_TORQUE_ERROR <= share <= LARGEST_TORQUE_ERROR:
+                raise ValueError(
+                    f"has torque_error = {self.torque_error:g} N*m, which must be {LEAST_TORQUE_ERROR:g} to {LARGEST_TORQUE_ERROR:g} of its holding_torque"
+                )
 
     def _check_line(self) -> None:
         """Stall torque and no-load speed come together, in place of a rated point; so do the currents."""
