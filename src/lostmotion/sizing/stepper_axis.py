@@ -146,7 +146,7 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
         lost,
         result.time,
         error,
-        result[f"{name}_electrical_angle"],
+        result[train.variable(name, "electrical_angle")],
     )
 
 

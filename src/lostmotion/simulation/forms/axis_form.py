@@ -19,11 +19,6 @@ PAYLOAD = "payload"
 BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
 
 
-def is_axis(tables: Mapping[str, Any]) -> bool:
-    """Whether the tables of a scenario are in the short form of a linear axis."""
-    return "axis" in tables
-
-
 def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
     """The same tables in the long form. Raises InputError: a table is missing, or is none of this form."""
     kind = _kind_of(tables)

@@ -94,7 +94,7 @@ class Scenario:
     def __init__(self, /, *nameless: Any, **tables: Any) -> None:
         if nameless:
             raise InputError(f"the scenario takes its values by name, such as title=...; not {shown(nameless[0])}")
-        if axis_form.is_axis(tables):
+        if "axis" in tables:
             with _in_keys(AXIS.in_file):
                 self._set(_in_long_form(axis_form.long_form(tables), AXIS.in_file), AXIS)
         elif is_train(tables):

@@ -9,8 +9,8 @@ from typing import Any, cast
 from ...errors import InputError, prefixed
 from ...inputs.arguments import checked
 from ...inputs.toml_files import read_toml
-from ...simulation.forms.axis_form import is_axis, long_form
-from ...simulation.forms.key_aliases import AXIS
+from ...simulation.forms.axis_form import long_form
+from ...simulation.forms.key_aliases import FORMS
 from ...simulation.runs.loading import load
 from ...simulation.runs.result_files import FORMATS
 from ...simulation.scenario.scenario import Scenario
@@ -55,7 +55,7 @@ def load_study(path: str | Path) -> Study:
     where = find_base(base, path)
     scenario = load(where, changes)
     written = {} if where.suffix in FORMATS else read_tables(where, changes)  # a result has all values written out
-    written = long_form(written) if is_axis(written) else written
+    written = long_form(written) if "axis" in written else written
     with prefixed(path):
         for entry in data.get("vary", []) if isinstance(data.get("vary"), list) else []:
             find_sheets(entry, path.parent)
@@ -83,15 +83,12 @@ def find_sheets(entry: Any, directory: Path) -> None:
 def from_json(text: str) -> Study:
     """The study that `to_json` wrote."""
     data = json.loads(text)
-    base = data["scenario"]
-    scenario = Scenario(**base)
-    data["scenario"] = (
-        Scenario.of(scenario.tables, AXIS, checked=False) if data.pop("in_axis_form", False) else scenario
-    )
-    return Study(**data)
+    scenario = Scenario(**data["scenario"])
+    form = FORMS.get(data.pop("form", ""), scenario.form)
+    return Study(**data | {"scenario": Scenario.of(scenario.tables, form, checked=False)})
 
 
 def to_json(study: Study) -> str:
     """The study as JSON, with its base scenario."""
     text = study.model_dump_json(exclude_none=True)
-    return f'{text.removesuffix("}")},"in_axis_form":true}}' if study.scenario.form == AXIS else text
+    return f'{text.removesuffix("}")},"form":"{study.scenario.form.name}"}}'
