@@ -15,13 +15,11 @@ def assert_plain(message: str) -> None:
     assert not re.search(r"Input should|https?:|pydantic|\b(tuple|dict|float|int|str|bool|NoneType|model)\b|[TF]alse|True", message)
 
 
-def refused(make: Callable[[], object]) -> str:
-    """The one line by which something is refused."""
-    with pytest.raises(lm.InputError) as caught:
+def refused(make: Callable[[], object], *keys: str, match: str = "") -> str:
+    """The one line by which something is refused, for the values with these keys and with a text that matches, where they are given."""
+    with refuses(*keys, match=match) as told:
         make()
-    message = str(caught.value)
-    assert "\n" not in message
-    return message
+    return told[0]
 
 
 def assert_file_refused(path: Path, text: str, old: str, new: str, words: list[str]) -> None:
@@ -35,8 +33,12 @@ def assert_file_refused(path: Path, text: str, old: str, new: str, words: list[s
 
 
 @contextmanager
-def refuses(*keys: str) -> Iterator[None]:
-    """What is within is refused, with these keys as data of the error."""
+def refuses(*keys: str, match: str = "") -> Iterator[list[str]]:
+    """What is within is refused in one line, with these keys as data of the error and a text that matches, where they are given."""
+    told: list[str] = []
     with pytest.raises(lm.InputError) as caught:
-        yield
-    assert [problem.keys for problem in caught.value.problems if problem.keys] == [keys], str(caught.value)
+        yield told
+    told.append(str(caught.value))
+    assert "\n" not in told[0]
+    assert not keys or [problem.keys for problem in caught.value.problems if problem.keys] == [keys], told[0]
+    assert re.search(match, told[0]), f"{told[0]} lacks {match}"

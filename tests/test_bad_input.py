@@ -181,11 +181,9 @@ OVERRIDES = [
 @pytest.mark.parametrize(("override", "sentence"), OVERRIDES, ids=[o for o, _ in OVERRIDES])
 def test_an_override_that_cannot_be_is_refused_as_it_was_written(tmp_path: Path, override: str, sentence: str) -> None:
     (tmp_path / "good.toml").write_text(GOOD)
-    with pytest.raises(lm.InputError) as caught:
-        lm.load(tmp_path / "good.toml", [override])
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert_plain(str(caught.value))
+    message = refused(lambda: lm.load(tmp_path / "good.toml", [override]))
+    assert sentence in message
+    assert_plain(message)
 
 
 def test_all_missing_keys_are_named_at_once(tmp_path: Path) -> None:
@@ -200,10 +198,9 @@ def test_all_missing_keys_are_named_at_once(tmp_path: Path) -> None:
 def test_all_that_is_wrong_is_named_at_once(tmp_path: Path) -> None:
     text = GOOD.replace("ratio = 90", "ratio = 0").replace("[command]", "[comand]").replace("mirrored", "miror")
     (tmp_path / "s.toml").write_text(text)
-    with pytest.raises(lm.InputError) as caught:
-        lm.load(tmp_path / "s.toml")
+    message = refused(lambda: lm.load(tmp_path / "s.toml"))
     for words in ("comand: is not known; did you mean command", "losses.miror: is not known", "ratio: 0 is no ratio"):
-        assert words in str(caught.value)
+        assert words in message
 
 
 PARTS = [
@@ -230,11 +227,9 @@ PARTS = [
 
 @pytest.mark.parametrize(("make", "sentence"), PARTS, ids=[s for _, s in PARTS])
 def test_constructors_refuse_in_the_words_of_the_command_line(make: Callable[[], object], sentence: str) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        make()
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
-    assert_plain(str(caught.value).replace("None must", "must"))
+    message = refused(make)
+    assert sentence in message
+    assert_plain(message.replace("None must", "must"))
 
 
 FUNCTIONS = [
@@ -285,10 +280,7 @@ FUNCTIONS = [
 
 @pytest.mark.parametrize(("call", "sentence"), FUNCTIONS, ids=[s for _, s in FUNCTIONS])
 def test_functions_refuse_bad_input_with_the_same_error(large: Path, call: Callable[[Scenario], object], sentence: str) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        call(lm.load(large))
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert sentence in refused(lambda: call(lm.load(large)))
 
 
 RECORD = {"gearbox.from": "schaeffler-rt1-h-20-100"}
@@ -308,10 +300,9 @@ OTHER_PLACES = [
 
 @pytest.mark.parametrize(("changes", "sentence"), OTHER_PLACES, ids=[s for _, s in OTHER_PLACES])
 def test_a_key_of_another_table_is_told_where_it_is_written(large: Path, changes: dict, sentence: str) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        lm.load(large, changes)
-    assert sentence in str(caught.value)
-    assert "added_backlash?" not in str(caught.value)
+    message = refused(lambda: lm.load(large, changes))
+    assert sentence in message
+    assert "added_backlash?" not in message
 
 
 def test_no_suggestion_leads_to_another_quantity() -> None:
@@ -412,9 +403,9 @@ def test_files_that_cannot_be_named_are_refused_by_their_names(tmp_path: Path, m
 def test_a_drive_that_cannot_be_says_so_once() -> None:
     gearbox = lm.gearbox("paper-gearbox").model_copy(update={"inertia": 0.0})
     motor = lm.Motor(kind="torque_source", rotor_inertia=0)
-    with pytest.raises(lm.InputError) as caught:
-        lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=1))
-    assert str(caught.value).startswith("the drive has no inertia on the input shaft; give")
+    assert refused(lambda: lm.Drive(motor=motor, gearbox=gearbox, load=lm.Load(inertia=1))).startswith(
+        "the drive has no inertia on the input shaft; give"
+    )
 
 
 def test_a_part_that_was_made_cannot_be_changed() -> None:
@@ -447,8 +438,7 @@ def test_any_value_under_any_key_is_read_or_refused_in_one_plain_line(large: Pat
 def test_an_input_shaft_without_inertia_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "broken.toml"
     path.write_text(GOOD.replace("rotor_inertia = 8e-6", "rotor_inertia = 0").replace("inertia = 6.7e-6", "inertia = 0"))
-    with pytest.raises(lm.InputError, match="no inertia on the input shaft"):
-        lm.load(path)
+    assert "no inertia on the input shaft" in refused(lambda: lm.load(path))
 
 
 def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_path: Path) -> None:
@@ -458,8 +448,7 @@ def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_p
     text = text.replace("[[0.02, 0.06], [0.08, 0.12]]", "[[1.4, 1.4], [0, 0], [2, 2]]")
     path = tmp_path / "jams.toml"
     path.write_text(text)
-    with pytest.raises(lm.InputError, match=r"jams.*compliance"):
-        lm.load(path)
+    refused(lambda: lm.load(path), match=r"jams.*compliance")
 
 
 # --- the command line --------------------------------------------------------------------------------------
@@ -585,8 +574,7 @@ def test_an_old_result_survives_a_failed_write(tmp_path: Path, monkeypatch: pyte
         raise OSError(28, "No space left on device")
 
     monkeypatch.setattr("lostmotion.simulation.runs.result_files._header", full)
-    with pytest.raises(lm.InputError, match="No space left"):
-        lm.save(result, target)
+    assert "No space left" in refused(lambda: lm.save(result, target))
     assert target.read_bytes() == old
     assert sorted(p.name for p in tmp_path.iterdir()) == ["good.toml", "result.csv"]
 
@@ -599,8 +587,7 @@ def test_an_unreadable_file_is_refused(tmp_path: Path, monkeypatch: pytest.Monke
         raise PermissionError(13, "Permission denied")
 
     monkeypatch.setattr(Path, "open", refuse)  # a test that runs as root could read anything
-    with pytest.raises(lm.InputError, match=r"secret\.toml: cannot be read: Permission denied"):
-        lm.load(path)
+    assert "secret.toml: cannot be read: Permission denied" in refused(lambda: lm.load(path))
 
 
 @pytest.mark.parametrize("ending", [".csv", ".nc", ".parquet"])
@@ -621,8 +608,7 @@ def test_damaged_result_files_are_refused(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"not a result\n1,2\n")
         with pytest.raises(lm.InputError, match=name):
             lm.open_result(tmp_path / name)
-    with pytest.raises(lm.InputError, match="no such file"):
-        lm.open_result(tmp_path / "none.csv")
+    assert "no such file" in refused(lambda: lm.open_result(tmp_path / "none.csv"))
 
 
 def test_an_error_carries_keys_and_reasons_as_data(tmp_path: Path) -> None:

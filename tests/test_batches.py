@@ -11,6 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.simulation.batches.walked_batches import WalkedBatch
+from refusals import refused
 
 STEP = 1e-3
 
@@ -177,8 +178,7 @@ def test_a_snapshot_brings_back_every_bit() -> None:
     batch.restore(before)
     assert batch.time == pytest.approx(0.1)
     assert np.array_equal(run(batch, commands[100:]), first)
-    with pytest.raises(lm.InputError, match="another batch"):
-        lm.SimulationBatch(drives, STEP).restore(before)
+    assert "another batch" in refused(lambda: lm.SimulationBatch(drives, STEP).restore(before))
 
 
 def test_reset_takes_back_those_that_are_meant() -> None:
@@ -333,8 +333,7 @@ def test_a_batch_of_any_train_answers_a_load_torque() -> None:
         found, want = batch.answer(**given, shaft="ring"), alone.answer(STEP, **given, shaft="ring")
         assert found.torque.tolist() == [want.torque] * 2
         assert found.derivative.tolist() == [want.derivative] * 2
-    with pytest.raises(lm.InputError, match="shaft"):
-        batch.answer(**given, shaft="crown")
+    assert "shaft" in refused(lambda: batch.answer(**given, shaft="crown"))
 
 
 @pytest.mark.parametrize("key", ["load.inertia", "gearbox.stiffness.backlash", "gearbox.losses.efficiency", "gearbox.ratio"])
@@ -732,14 +731,10 @@ def test_a_given_motion_takes_the_torque_of_newtons_law() -> None:
     # (J + i^2 J_M) a = i M + drive torque
     assert batch["load_drive_torque"] == pytest.approx((1.0 + 2500 * 1e-4) * acceleration - 50 * 0.1, rel=1e-12)
     assert batch["load_angle"] == pytest.approx(0.5 * acceleration * 0.01**2, rel=1e-12, abs=1e-18)
-    with pytest.raises(lm.InputError, match="load_torque: does not act on load, whose motion is given"):
-        batch.step(0.1, 1.0, motion={"speed": 0.0})
-    with pytest.raises(lm.InputError, match=r"motion\.speed: is missing"):
-        batch.step(0.1, motion={"angle": 0.0})
-    with pytest.raises(lm.InputError, match=r"motion\.sped: is not known; did you mean speed"):
-        batch.step(0.1, motion={"sped": 0.0})
-    with pytest.raises(lm.InputError, match="motion: is missing"):
-        batch.step(0.1)
+    assert "load_torque: does not act on load, whose motion is given" in refused(lambda: batch.step(0.1, 1.0, motion={"speed": 0.0}))
+    assert "motion.speed: is missing" in refused(lambda: batch.step(0.1, motion={"angle": 0.0}))
+    assert "motion.sped: is not known; did you mean speed" in refused(lambda: batch.step(0.1, motion={"sped": 0.0}))
+    assert "motion: is missing" in refused(lambda: batch.step(0.1))
 
 
 def test_a_given_motion_moves_each_drive_as_alone() -> None:
@@ -792,5 +787,4 @@ def test_controllers_that_a_batch_does_not_run_are_refused(options: dict[str, ob
     with pytest.raises(lm.InputError, match=message) as raised:
         lm.SimulationBatch(lm.load("position-axis").drive(), STEP, count=2, **options)  # type: ignore[arg-type]
     assert "\n" not in str(raised.value)
-    with pytest.raises(lm.InputError, match="motion: is for a batch with given_motion"):
-        lm.SimulationBatch(simple_drive(), STEP, count=2).step(0.1, motion={"speed": 1.0})
+    assert "motion: is for a batch" in refused(lambda: lm.SimulationBatch(simple_drive(), STEP, count=2).step(0.1, motion={"speed": 1.0}))

@@ -14,6 +14,7 @@ from lostmotion.cli import app
 from lostmotion.response.windows import fitting
 from lostmotion.servo.linear_regimes import axis_of, regimes
 from lostmotion.servo.linear_sampled_loop import LinearLoop
+from refusals import refused
 from two_mass import T, two_mass
 
 
@@ -167,12 +168,9 @@ def test_frequencies_that_do_not_fit_are_moved_to_the_nearest() -> None:
 
 
 def test_what_cannot_be_a_source_is_refused() -> None:
-    with pytest.raises(lm.InputError, match="is not known; it must be reference or load_torque"):
-        lm.frequency_response(axis(), 1.0, 0.1, source="command")
-    with pytest.raises(lm.InputError, match="mean_command: a controller turns the motor"):
-        lm.frequency_response(axis(), 1.0, 0.1, mean_command=0.5)
-    with pytest.raises(lm.InputError, match="law: the scenario has no controller"):
-        lm.frequency_response(lm.load("paper-2dof-l-small"), 1.0, 0.1, law=print)
+    assert "is not known; it must be reference or" in refused(lambda: lm.frequency_response(axis(), 1.0, 0.1, source="command"))
+    assert "mean_command: a controller turns the motor" in refused(lambda: lm.frequency_response(axis(), 1.0, 0.1, mean_command=0.5))
+    assert "law: the scenario has no" in refused(lambda: lm.frequency_response(lm.load("paper-2dof-l-small"), 1.0, 0.1, law=print))
 
 
 def test_a_law_of_ones_own_has_a_response() -> None:

@@ -23,6 +23,7 @@ from lostmotion.reports import plots, thinning
 from lostmotion.reports.listing import list_records
 from lostmotion.simulation.runs.run import run
 from lostmotion.simulation.runs.run_time_forecast import forecast
+from refusals import refused
 
 SMALL = "paper-2dof-nl-small"
 
@@ -78,19 +79,16 @@ def test_an_unknown_name_is_told_with_the_nearest(tmp_path: Path) -> None:
     assert done.stderr == (
         "lostmotion: paper-2dof-nl-smal: there is no such file (.toml) and no such scenario; did you mean paper-2dof-nl-small?\n"
     )
-    with pytest.raises(lm.InputError, match="the scenarios that come with the package are backlash-reversing-load, "):
-        lm.load("xyz")
+    assert "the scenarios that come with the package are backlash-reversing-load, " in refused(lambda: lm.load("xyz"))
 
 
 def test_a_directory_does_not_hide_a_shipped_scenario_and_its_file_name_leads_to_it(tmp_path: Path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     Path(SMALL).mkdir()
     assert lm.load(SMALL) == lm.load(SCENARIOS[0].parent / f"{SMALL}.toml")
-    with pytest.raises(lm.InputError, match=f"{SMALL}.toml: there is no such file; the shipped scenario is called {SMALL}"):
-        lm.load(f"{SMALL}.toml")
+    refused(lambda: lm.load(f"{SMALL}.toml"), match=f"{SMALL}.toml: there is no such file; the shipped scenario is called {SMALL}")
     Path("folder").mkdir()
-    with pytest.raises(lm.InputError, match="folder: is a directory"):
-        lm.load("folder")
+    assert "folder: is a directory" in refused(lambda: lm.load("folder"))
 
 
 def test_a_file_that_is_no_result_of_a_run_is_refused(tmp_path: Path) -> None:
@@ -114,8 +112,7 @@ def test_a_saved_result_is_run_again_as_it_was(tmp_path: Path, ending: str) -> N
     assert lm.open_result(second).identical(lm.open_result(first))
     changed = lm.load(first, ["command.amplitude=0.1"])
     assert changed == lm.load(SMALL, {"load.inertia": 1.5, "command.amplitude": 0.1})
-    with pytest.raises(lm.InputError, match=rf"first.{ending}: key load.inertai: is not known; did you mean inertia"):
-        lm.load(first, ["load.inertai=1"])
+    refused(lambda: lm.load(first, ["load.inertai=1"]), match=rf"first.{ending}: key load.inertai: is not known; did you mean inertia")
 
 
 # --- the catalogue ---
@@ -136,10 +133,8 @@ def test_the_catalogue_says_what_is_a_gearbox_a_motor_complete_or_not() -> None:
     only = list_records("gearbox", complete=True).splitlines()
     assert [line.split()[0] for line in only[1:-2]] == [r.name for r in complete]
     assert len(list_records("dc_brushed").splitlines()) > 4
-    with pytest.raises(lm.InputError, match="--kind engine: is not known; take one of gearbox, motor, "):
-        list_records("engine")
-    with pytest.raises(lm.InputError, match=r"--kind planetry: is not known; did you mean planetary\?"):
-        list_records("planetry")
+    assert "--kind engine: is not known; take one of gearbox, motor, " in refused(lambda: list_records("engine"))
+    assert "--kind planetry: is not known; did you mean planetary?" in refused(lambda: list_records("planetry"))
     assert list_records(ratio="50-100") == list_records(ratio="50..100")
 
 
@@ -292,7 +287,6 @@ MAY_IMPORT = {
     "run catalogue-robot-joint --set load.inertia=2": set(),
     "run direction-finder --solver dormand-prince --set simulation.duration=0.1": {"scipy"},
     "run paper-2dof-nl-small -o run.csv": DATASETS,
-    "run paper-2dof-nl-small -o run.parquet": DATASETS,
     "run paper-2dof-nl-small -o run.nc": DATASETS | NETCDF,
     "run paper-2dof-nl-small --plot run.svg": DATASETS | FIGURES,
     "schema": set(),

@@ -20,6 +20,7 @@ from scipy.optimize import brentq
 import lostmotion as lm
 from conftest import some
 from lostmotion.simulation.forms.key_aliases import DRIVE
+from refusals import refused
 
 J = 1.0  # kg m2
 PID = {"gain": 4.0, "integral_gain": 1.5, "derivative_gain": 0.8}
@@ -412,10 +413,8 @@ def test_systems_of_scipy_and_python_control_act_as_the_pid_that_they_equal() ->
         run = lm.simulate(two_masses(reference=reference, position=None, state_space=lm.control.as_state_space(system)))
         x = wanted["load_angle"].values
         np.testing.assert_allclose(run["load_angle"].values, x, rtol=0.0, atol=1e-11 * np.abs(x).max())
-    with pytest.raises(lm.InputError, match="has a sample time of"):
-        lm.control.as_state_space(scipy.signal.dlti(top, bottom, dt=0.1))
-    with pytest.raises(lm.InputError, match="as many poles as zeros"):
-        lm.control.as_state_space(scipy.signal.lti([1.0, 2.0, 3.0], [1.0, 1.0]))
+    assert "has a sample time of" in refused(lambda: lm.control.as_state_space(scipy.signal.dlti(top, bottom, dt=0.1)))
+    assert "as many poles as zeros" in refused(lambda: lm.control.as_state_space(scipy.signal.lti([1.0, 2.0, 3.0], [1.0, 1.0])))
 
 
 REFUSED = [
@@ -434,17 +433,13 @@ REFUSED = [
 
 @pytest.mark.parametrize(("changes", "message"), REFUSED, ids=[m[:30] for _, m in REFUSED])
 def test_what_cannot_be_used_is_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
-    with pytest.raises(lm.InputError, match=message) as refused:
-        two_masses(**changes)
-    assert "\n" not in str(refused.value)
-    assert "controllers.servo" in str(refused.value)
+    assert "controllers.servo" in refused(lambda: two_masses(**changes), match=message)
 
 
 def test_a_derivative_of_a_reference_with_steps_needs_a_filter() -> None:
     pid = {"gain": 1.0, "derivative_gain": 0.1, "derivative_weight": 1.0}
     step = {"kind": "position", "steps": [{"time": 0.1, "height": 1.0}]}
-    with pytest.raises(lm.InputError, match="whose derivative has no bounds; give a filter_time"):
-        two_masses(position=pid, reference=step)
+    refused(lambda: two_masses(position=pid, reference=step), "controllers.servo")
 
 
 def test_a_map_has_the_limit_cycles_of_its_points() -> None:
@@ -525,5 +520,4 @@ def test_in_the_short_form_it_makes_a_train_of_the_drive(tmp_path: Path) -> None
 def test_what_is_wrong_in_the_short_form_has_its_key(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "short.toml"
     path.write_text(text)
-    with pytest.raises(lm.InputError, match=message):
-        lm.load(path)
+    refused(lambda: lm.load(path), match=message)

@@ -13,6 +13,7 @@ from scipy import signal
 import lostmotion as lm
 from conftest import ALL_SCENARIOS
 from lostmotion.control.filters import LowPass, Notch, as_filter, discrete
+from refusals import refused
 
 SHOWN = ("motor_speed", "load_speed", "load_angle", "twist", "torque_reference", "measured_speed")
 
@@ -241,8 +242,7 @@ def test_a_filter_in_the_loop_is_lfilter_of_its_input() -> None:
         assert got == pytest.approx(signal.lfilter(b, a, np.full(len(got), 1e-5 * W)), abs=1e-12)
     control = pytest.importorskip("control")
     assert as_filter(control.tf(b, a, T)).numerator == pytest.approx(tuple(b), rel=1e-9)
-    with pytest.raises(lm.InputError, match="sample time"):
-        as_filter(control.tf([1.0], [1.0, 1.0]))
+    assert "sample time" in refused(lambda: as_filter(control.tf([1.0], [1.0, 1.0])))
 
 
 # --- what takes no controller ---

@@ -20,7 +20,7 @@ from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.initial_state import start_values
 from lostmotion.simulation.forms.key_aliases import DRIVE
 from lostmotion.simulation.forms.train_tables import TrainTables, train_schema
-from refusals import refuses
+from refusals import refused, refuses
 
 TRAIN: dict[str, Any] = {
     "shafts": {
@@ -133,25 +133,22 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
     ],
 )
 def test_what_is_wrong_with_a_train_is_said_in_one_line(file: Path, change: str, line: str) -> None:
-    with pytest.raises(lm.InputError) as refused:
-        lm.load(file, [change])
-    assert str(refused.value) == f"{file}: {line}"
+    assert refused(lambda: lm.load(file, [change])) == f"{file}: {line}"
 
 
 def test_rigid_gears_in_a_loop_are_refused_with_their_key() -> None:
     rigid = {"input": "motor", "output": "table", "ratio": 100.0}
     gears = {name: gear | {"stiffness": {"kind": "rigid"}} for name, gear in TRAIN["gears"].items()}
-    with pytest.raises(lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with the same ratio"):
+    with refuses("gears.direct", match=r"^key gears.direct: closes a loop of rigid gears with the same ratio"):
         lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid}})
-    with pytest.raises(lm.InputError, match=r"^key gears.direct: closes a loop of rigid gears with another ratio: nothing"):
+    with refuses("gears.direct", match=r"^key gears.direct: closes a loop of rigid gears with another ratio: nothing"):
         lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid | {"ratio": 90.0}}})
 
 
 def test_rigid_gears_bind_the_speeds_at_the_start() -> None:
     gears = {"gears.belt.stiffness": {"kind": "rigid"}}
     assert train(**gears, **{"initial.speeds": {"motor": 4.0, "worm": 2.0}})
-    with pytest.raises(lm.InputError, match=r"initial\.speeds\.worm: 2 rad/s does not fit motor = 5 rad/s"):
-        train(**gears, **{"initial.speeds": {"motor": 5.0, "worm": 2.0}})
+    refused(lambda: train(**gears, **{"initial.speeds": {"motor": 5.0, "worm": 2.0}}), "initial.speeds.worm")
 
 
 def test_a_rigid_gear_on_a_housing_binds_three_speeds_at_the_start() -> None:
@@ -165,8 +162,7 @@ def test_a_rigid_gear_on_a_housing_binds_three_speeds_at_the_start() -> None:
     result = lm.simulate(lm.Scenario(**tables, initial={"speeds": speeds}))
     assert {name: float(result[f"{name}_speed"][-1]) for name in speeds} == speeds
     assert {name: float(result[f"{name}_angle"][-1]) for name in speeds} == pytest.approx(speeds, rel=1e-14)
-    with pytest.raises(lm.InputError, match=r"on the housing ring = 0.5 rad/s; relative to it their quotient must be"):
-        lm.Scenario(**tables, initial={"speeds": speeds | {"ring": 0.5}})
+    refused(lambda: lm.Scenario(**tables, initial={"speeds": speeds | {"ring": 0.5}}), "initial.speeds")
 
 
 def test_angles_at_the_start_follow_through_the_gears() -> None:
@@ -174,8 +170,7 @@ def test_angles_at_the_start_follow_through_the_gears() -> None:
     start = start_values(scenario.train(), scenario.initial)
     assert start["motor_angle"] == pytest.approx(2.0 * (10.0 + 0.1), rel=1e-14)
     assert start["table_angle"] == pytest.approx(10.0 / 50.0 - 0.02, rel=1e-14)
-    with pytest.raises(lm.InputError, match=r"initial.angles.table: 0.2 rad does not fit motor = 1.0 rad through the gear"):
-        train(**{"initial.angles": {"motor": 1.0, "table": 0.2}})
+    refused(lambda: train(**{"initial.angles": {"motor": 1.0, "table": 0.2}}), "initial.angles.table")
 
 
 def test_gravity_and_a_torque_over_angle_need_names_of_their_own() -> None:
@@ -284,8 +279,7 @@ def test_trains_are_immutable_and_survive_pickling() -> None:
         assert hash(copy.deepcopy(thing)) == hash(thing)
     with pytest.raises(lm.InputError, match="frozen"):
         scenario.shafts["more"] = lm.Shaft()  # type: ignore[assignment]
-    with pytest.raises(lm.InputError, match="frozen"):
-        scenario.shafts.clear()
+    assert "frozen" in refused(scenario.shafts.clear)
     assert lm.Scenario.from_json(scenario.to_json()) == scenario
     assert repr(scenario.train()) == "DriveTrain(shafts motor, worm, table; motors m1; gears belt, worm; brakes hold)"
     reversed_shafts = dict(reversed(scenario.train().shafts.items()))
@@ -318,10 +312,8 @@ def test_shipped_trains_load_and_survive_json(path: Path) -> None:
 
 
 def test_what_takes_one_gear_or_linear_friction_alone_says_so() -> None:
-    with pytest.raises(lm.InputError, match=r"brakes\.hold.* acts too, and the closed form has inertia and viscous"):
-        lm.response.rigid_constants(train())
-    with pytest.raises(lm.InputError, match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears"):
-        lm.test_rig.TestRig(train())
+    refused(lambda: lm.response.rigid_constants(train()), "brakes.hold")
+    refused(lambda: lm.test_rig.TestRig(train()), match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears")
 
 
 # --- runs ---

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import some
 from fuzz.random_trains import train as fuzz_train
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.monitor.monitor import monitor_logs
@@ -25,6 +26,7 @@ from lostmotion.identification.virtual_logs import virtual_log
 from lostmotion.inputs.toml_text import toml_text
 from lostmotion.live_page.description import describe
 from lostmotion.studies.runs.read_table import read_table
+from refusals import refused
 from test_random_axes import random_axis
 
 LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice")  # which only take longer
@@ -287,7 +289,7 @@ def random_scenario(seed: int) -> lm.Scenario:
     return scenario.replace(**times)
 
 
-@pytest.mark.parametrize("seed", range(40))
+@pytest.mark.parametrize("seed", range(some(40, 20)))  # four of each kind
 def test_no_function_refuses_a_random_scenario_by_its_form(seed: int, tmp_path: Path) -> None:
     scenario = random_scenario(seed)
     assert refusals(scenario, tmp_path, FUNCTIONS if seed < 5 else QUICKEST) == []
@@ -351,9 +353,7 @@ def test_a_key_of_the_file_and_that_of_the_long_form_are_one(name: str, own: str
 
 def test_a_changed_axis_speaks_of_the_keys_of_its_file() -> None:
     changed = lm.load("ball-screw-axis").replace(**{"axis.slide.mass": 21.0})
-    with pytest.raises(lm.InputError) as refusal:
-        changed.replace(**{"slides.slide.mass": -1.0})
-    assert [problem.keys for problem in refusal.value.problems] == [("axis.slide.mass",)]
+    refused(lambda: changed.replace(**{"slides.slide.mass": -1.0}), "axis.slide.mass")
 
 
 def test_the_one_command_and_the_one_load_are_given_alike_in_each_form() -> None:

@@ -17,6 +17,7 @@ from conftest import some
 from full_equations import Axis
 from lostmotion.reports.run import summary
 from lostmotion.simulation.runs.run import whole_run
+from refusals import refused
 
 T = 125e-6
 
@@ -330,11 +331,9 @@ def test_step_by_step_the_bound_is_that_of_the_run_and_holds(number: int) -> Non
 
 
 def test_a_bound_step_by_step_needs_field_oriented_control_and_a_law_that_repeats() -> None:
-    with pytest.raises(lm.InputError, match="field_oriented"):
-        lm.Simulation(lm.load("position-axis"), error_bound=True)
+    assert "field_oriented" in refused(lambda: lm.Simulation(lm.load("position-axis"), error_bound=True))
     one = scenario(changed(ROUND, J_M=1e-3), 10, law=True)
-    with pytest.raises(lm.InputError, match="repeatable=True"):
-        lm.Simulation(one, law=lambda *_: (1.0, 2.0), error_bound=True)
+    assert "repeatable=True" in refused(lambda: lm.Simulation(one, law=lambda *_: (1.0, 2.0), error_bound=True))
 
 
 def test_an_input_that_changes_within_a_tick_is_felt_there() -> None:
@@ -414,11 +413,9 @@ def test_what_cannot_be_controlled_so_is_refused(changes: dict[str, Any], words:
             del table[last]
         else:
             table[last] = value
-    with pytest.raises(lm.InputError) as refused:
-        lm.Scenario(**data)
-    assert "\n" not in str(refused.value)
+    message = refused(lambda: lm.Scenario(**data))
     for word in words:
-        assert word in str(refused.value)
+        assert word in message
 
 
 def test_a_law_must_give_both_voltages() -> None:

@@ -14,6 +14,7 @@ import pytest
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, jamming
 from lostmotion.portable import fmu as exporting
+from refusals import refused
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="FMPy runs the library for this platform, tests know Linux alone")
@@ -317,13 +318,11 @@ def test_a_jam_ends_in_an_error_with_the_sentence_of_python(tmp_path: Path) -> N
     ("arguments", "said"), [(("drive.zip",), "must end in .fmu"), (("nowhere/drive.fmu",), "its directory does not exist")]
 )
 def test_a_path_that_cannot_be_written_is_refused(arguments: Any, said: str, tmp_path: Path) -> None:
-    with pytest.raises(lm.InputError, match=said):
-        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / arguments[0])
+    refused(lambda: lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / arguments[0]), match=said)
 
 
 def test_without_a_library_there_is_no_fmu(tmp_path: Path) -> None:
-    with pytest.raises(lm.InputError, match="has no library of an FMU; install a wheel, or build it in a checkout by `make fmu-library`"):
-        lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu", libraries=tmp_path)
+    assert "has no library" in refused(lambda: lm.export_fmu(lm.load("paper-2dof-nl-small"), tmp_path / "drive.fmu", libraries=tmp_path))
 
 
 def test_without_its_controller_the_motor_is_turned_by_an_input(tmp_path: Path) -> None:
@@ -473,8 +472,7 @@ def test_more_indicators_than_there_can_be_are_refused(drum: Path, tmp_path: Pat
 
 def test_a_title_that_xml_cannot_hold_is_refused(tmp_path: Path) -> None:
     scenario = lm.load("paper-2dof-nl-small").replace(title="a\u0001b")
-    with pytest.raises(lm.InputError, match=r"title: 'a\\x01b' holds a control character"):
-        lm.export_fmu(scenario, tmp_path / "x.fmu")
+    assert "title: 'a\\x01b' holds a control character" in refused(lambda: lm.export_fmu(scenario, tmp_path / "x.fmu"))
     assert not list(tmp_path.iterdir())
 
 

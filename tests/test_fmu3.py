@@ -8,6 +8,7 @@ from xml.etree import ElementTree as ET
 import pytest
 
 import lostmotion as lm
+from refusals import refused
 from test_fmu import Slave, pytestmark
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
@@ -114,10 +115,8 @@ def test_a_reference_as_input_acts_as_that_of_the_scenario(fmi: int, tmp_path: P
 
 def test_a_reference_whose_past_has_to_be_known_stays_inside(tmp_path: Path) -> None:
     scenario = lm.load("position-axis", ["controller.position.reference_delay='1 ms'"])
-    with pytest.raises(lm.InputError, match="reference_delay, for which it has to know the past"):
-        lm.export_fmu(scenario, tmp_path / "axis.fmu", references=True)
+    assert "reference_delay, for which it has to know" in refused(lambda: lm.export_fmu(scenario, tmp_path / "axis.fmu", references=True))
 
 
 def test_another_version_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(lm.InputError, match=r"fmi: 1 must be 2 \(FMI 2.0\) or 3 \(FMI 3.0\)"):
-        lm.export_fmu(lm.load("speed-axis"), tmp_path / "axis.fmu", fmi=1)
+    assert "fmi: 1 must be 2 (FMI 2.0) or 3 (FMI" in refused(lambda: lm.export_fmu(lm.load("speed-axis"), tmp_path / "axis.fmu", fmi=1))

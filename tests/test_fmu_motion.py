@@ -10,6 +10,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
+from refusals import refused
 from test_fmu import Slave
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")
@@ -149,5 +150,4 @@ def test_the_command_line_exports_it_and_refuses_what_is_no_shaft(tmp_path: Path
     run = CliRunner().invoke(app, ["fmu", "given-motion", "-o", str(tmp_path / "f.fmu"), "--motion-inputs", "crank"])
     assert run.exit_code == 0, run.output
     assert "Input crank_given_angle replaces shafts.crank.speed" in run.output
-    with pytest.raises(lm.InputError, match='motion_inputs: "cranc" is no shaft and no slide'):
-        lm.export_fmu(crank(), tmp_path / "f.fmu", motion_inputs=["cranc"])
+    assert 'motion_inputs: "cranc" is no shaft' in refused(lambda: lm.export_fmu(crank(), tmp_path / "f.fmu", motion_inputs=["cranc"]))

@@ -15,6 +15,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from conftest import some
 from lostmotion.model.signals import GivenSpeedSignal
+from refusals import refused, refuses
 
 SPRING = {"kind": "linear", "stiffness": 100.0}
 CASE: dict[str, Any] = {
@@ -214,8 +215,7 @@ def test_steps_move_a_slide_by_its_position() -> None:
     simulation.advance(0.1, motion={"table": {"position": "1 mm", "speed": 0.03, "acceleration": 0.6}})
     assert simulation["table_position"] == pytest.approx(1e-3, abs=1e-17)
     assert simulation["table_drive_force"] == pytest.approx(1.8, rel=1e-13)
-    with pytest.raises(lm.InputError, match=r"motion\.table\.angle: is not known"):
-        simulation.advance(0.1, motion={"table": {"angle": 1.0, "speed": 0.0}})
+    assert "motion.table.angle: is not known" in refused(lambda: simulation.advance(0.1, motion={"table": {"angle": 1.0, "speed": 0.0}}))
 
 
 @pytest.mark.parametrize(
@@ -232,10 +232,8 @@ def test_steps_move_a_slide_by_its_position() -> None:
     ],
 )
 def test_a_motion_that_no_torque_gives_is_refused(crank: Any, initial: Any, says: str) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        scenario(shafts={"crank": {"inertia": 1.0, "motion": crank}, "load": {"inertia": 1.0}}, initial=initial)
-    assert says in str(caught.value)
-    with pytest.raises(lm.InputError, match="both give the motion"):
+    assert says in refused(lambda: scenario(shafts={"crank": {"inertia": 1.0, "motion": crank}, "load": {"inertia": 1.0}}, initial=initial))
+    with refuses("shafts.crank.speed", "shafts.crank.motion"):
         scenario(shafts={"crank": {"inertia": 1.0, "motion": MOVES, "speed": 1.0}, "load": {"inertia": 1.0}})
 
 
@@ -385,24 +383,22 @@ def test_the_torque_is_the_rate_of_momentum_and_what_is_lost() -> None:
     ],
 )
 def test_a_speed_that_no_torque_gives_is_refused(speed: Any, says: str) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        scenario(shafts={"crank": {"inertia": 1.0, "speed": speed}, "load": {"inertia": 1.0}})
-    assert says in str(caught.value)
+    assert says in refused(lambda: scenario(shafts={"crank": {"inertia": 1.0, "speed": speed}, "load": {"inertia": 1.0}}))
 
 
 def test_two_given_speeds_on_a_rigid_gear_are_refused() -> None:
-    with pytest.raises(lm.InputError) as caught:
-        scenario(
+    assert "key gears.g: is rigid and joins shafts whose motions are both given; give it a stiffness" in refused(
+        lambda: scenario(
             shafts={"crank": {"inertia": 1.0, "speed": 1.0}, "load": {"inertia": 1.0, "speed": 1.0}},
             gears={"g": {"input": "crank", "output": "load", "ratio": 1.0}},
         )
-    assert "key gears.g: is rigid and joins shafts whose motions are both given; give it a stiffness" in str(caught.value)
+    )
 
 
 def test_an_initial_speed_beside_a_given_one_is_refused() -> None:
-    with pytest.raises(lm.InputError) as caught:
-        scenario(initial={"speeds": {"crank": 1.0}})
-    assert "keys shafts.crank.speed, initial.speeds.crank: both say how fast the shaft turns" in str(caught.value)
+    assert "keys shafts.crank.speed, initial.speeds.crank: both say how fast the shaft turns" in refused(
+        lambda: scenario(initial={"speeds": {"crank": 1.0}})
+    )
 
 
 @pytest.mark.parametrize(
@@ -415,9 +411,7 @@ def test_an_initial_speed_beside_a_given_one_is_refused() -> None:
     ],
 )
 def test_what_needs_a_train_that_torques_move_says_so(use: Any) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        use(scenario())
-    assert "key shafts.crank.speed gives the motion of a shaft" in str(caught.value)
+    assert "key shafts.crank.speed gives the motion of a shaft" in refused(lambda: use(scenario()))
 
 
 def test_a_given_angle_begins_at_zero_or_where_it_is_told() -> None:
@@ -511,8 +505,7 @@ def test_a_train_alone_takes_the_given_shafts_by_name() -> None:
     assert simulation.given == ("load",)
     simulation.advance(0.1, motion={"load": {"speed": 2.0}})
     assert simulation["load_speed"] == 2.0
-    with pytest.raises(lm.InputError, match='given: "cranc" is no shaft of this train'):
-        lm.Simulation(train, given=["cranc"])
+    assert 'given: "cranc" is no shaft of this train' in refused(lambda: lm.Simulation(train, given=["cranc"]))
 
 
 @pytest.mark.parametrize("inertia", [1e10, 1e12, 1e15])

@@ -316,25 +316,3 @@ def test_examples_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")
-
-
-def test_help_names_every_command() -> None:
-    done = subprocess.run([sys.executable, "-m", "lostmotion", "--help"], capture_output=True, text=True, check=True)
-    for command in (
-        "reproduce",
-        "run",
-        "response",
-        "rig",
-        "catalogue",
-        "scenarios",
-        "new",
-        "check",
-        "servo",
-        "steps",
-        "track",
-        "identify",
-        "monitor",
-        "study",
-        "schema",
-    ):
-        assert f"  {command} " in done.stdout

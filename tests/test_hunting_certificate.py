@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
+from refusals import refused
 
 INERTIA, K_P, K_I, K_D = 0.5, 50.0, 120.0, 8.0
 SLIDING = 2.0
@@ -123,12 +124,9 @@ def test_what_is_not_decided_is_named(changes: dict[str, Any], reason: str) -> N
 
 
 def test_other_controllers_and_a_wrong_error_are_refused() -> None:
-    with pytest.raises(lm.InputError, match=r"reference\.kind: speed; the certificate is that of a position controller"):
-        lm.hunting_certificate(lm.load("speed-axis"))
-    with pytest.raises(lm.InputError, match="the scenario has no controller"):
-        lm.hunting_certificate(lm.load("step-to-standstill"))
-    with pytest.raises(lm.InputError, match="largest_error: -1"):
-        lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error=-1.0)
+    refused(lambda: lm.hunting_certificate(lm.load("speed-axis")), "controllers.motor.reference.kind")
+    assert "the scenario has no controller" in refused(lambda: lm.hunting_certificate(lm.load("step-to-standstill")))
+    assert "largest_error: -1" in refused(lambda: lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error=-1.0))
     assert lm.hunting_certificate(lm.load("hunting-with-static-friction"), largest_error="10 mrad").largest_error == 0.01
 
 

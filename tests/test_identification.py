@@ -33,6 +33,7 @@ from lostmotion.reports import plots
 from lostmotion.reports.identification import correlations, friction_curve, friction_curves, loop_curves, loss_curves, write_identification
 from lostmotion.reports.panels import Matrix
 from lostmotion.simulation.forms.key_aliases import DRIVE
+from refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -268,8 +269,7 @@ def test_a_run_that_fails_at_the_start_values_names_its_log(logs: Path) -> None:
     point = start_point(task, prepared_logs)
     wrong = replace(point, nuisance={"002.json": {"coulomb_friction": -1.0}})
     problem = problem_of(rig, Engine(rig, threads=1), prepared_logs, 0)
-    with pytest.raises(lm.InputError, match=r"002\.json: has no run at the start values of .*friction_torque"):
-        search(problem, wrong, iterations=1)
+    refused(lambda: search(problem, wrong, iterations=1), match=r"002\.json: has no run at the start values of .*friction_torque")
 
 
 @pytest.mark.parametrize("starts", [(0.5, 2.0, 6.0), (6.0, 2.0, 0.5)])
@@ -435,8 +435,7 @@ def test_an_experiment_with_the_motor_off_tells_friction_from_back_emf(found: Id
     ranked = lm.identification.design_experiment(found, [still, swing])
     assert [c.name for c in ranked] == ["002.json", "stands"]
     assert ranked[0].widths["viscous_friction"] < ranked[1].widths["viscous_friction"] <= 1.0
-    with pytest.raises(lm.InputError, match="is empty"):
-        lm.identification.design_experiment(found, [])
+    assert "is empty" in refused(lambda: lm.identification.design_experiment(found, []))
 
 
 def test_intervals_of_random_servos_hold_the_truth() -> None:

@@ -11,6 +11,7 @@ import lostmotion as lm
 from lostmotion.cli.entry import app
 from lostmotion.identification.campaign import OFF, experiments, parameters, rig_scenario
 from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
+from refusals import refused
 
 NAME = "schaeffler-rt1-h-20-100"
 
@@ -126,6 +127,5 @@ def test_every_law_of_a_gearbox_has_its_parameters(stiffness: object, losses: ob
 
 def test_a_gearbox_without_inertia_is_refused(gearbox: lm.Gearbox, tmp_path: Path) -> None:
     massless = lm.Gearbox(**{**gearbox.model_dump(), "inertia": 0.0})
-    with pytest.raises(lm.InputError, match="has no inertia"):
-        lm.identification.write_campaign(tmp_path / "campaign", massless)
+    assert "has no inertia" in refused(lambda: lm.identification.write_campaign(tmp_path / "campaign", massless))
     assert not (tmp_path / "campaign").exists()

@@ -17,6 +17,7 @@ from lostmotion.identification.rig.residuals import start_point
 from lostmotion.identification.rig.rig_runs import run_log
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification, load_identification
+from refusals import refused
 
 EXAMPLE = ROOT / "examples" / "cycloidal"
 # Thesis of J. Volbeda: play [deg], compliance [deg/(N m)], Coulomb friction [N m].
@@ -160,6 +161,4 @@ def test_weights_multiply_residuals_and_leave_the_errors_as_they_are() -> None:
 )
 def test_weights_that_are_none_are_refused(weight: str, said: str) -> None:
     task, rig = task_of(weight=weight)
-    with pytest.raises(lm.InputError, match=said) as refused:
-        prepared(task, read_all(task, EXAMPLE)[0], rig.units)
-    assert "split-1.csv: key logs.weight" in str(refused.value)
+    assert "split-1.csv: key logs.weight" in refused(lambda: prepared(task, read_all(task, EXAMPLE)[0], rig.units), match=said)

@@ -12,6 +12,7 @@ import pytest
 import lostmotion as lm
 from dry_friction import angles, write_log
 from lostmotion.inputs.toml_text import toml_text
+from refusals import refused
 
 COULOMB, VISCOUS, INERTIA = 0.06, 3e-3, 3e-4  # at the motor
 TASK: dict[str, Any] = {"logs": {"files": ["l*.csv"]}, "fit": {"regression": False}}
@@ -90,9 +91,7 @@ def test_a_rig_is_written_in_any_form(form: str, tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("deviation", ["1 mrad", -1e-6, 0.0])
 def test_a_deviation_is_one_of_its_variable(deviation: Any, tmp_path: Path) -> None:
-    with pytest.raises(lm.InputError) as refused:
-        found("axis", tmp_path, deviation=deviation)
-    assert refused.value.problems[0].keys == ("measured.position.deviation",)
+    refused(lambda: found("axis", tmp_path, deviation=deviation), "measured.position.deviation")
 
 
 def test_inertias_before_and_behind_a_rigid_gear_are_told_apart_by_no_log(tmp_path: Path) -> None:

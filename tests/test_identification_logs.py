@@ -16,6 +16,7 @@ from lostmotion.identification.preparation.screening import screened
 from lostmotion.identification.readers.channel_units import channel_factor
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.readers.log_files import find_logs, read_log
+from refusals import refused, refuses
 
 TIME = np.arange(200) * 0.01
 ANGLE = np.sin(3.0 * TIME)
@@ -168,8 +169,7 @@ def test_messages_of_an_mcap_file_are_channels_at_the_times_of_one_topic(tmp_pat
     assert log.header == {"mass": 0.5, "unit": "left"}
     assert any("servo/goal" in note for note in log.notes)
     assert read_log(path, time="/servo/goal").time == pytest.approx(TIME[::4], abs=1e-9)
-    with pytest.raises(lm.InputError, match="has no topic servo/stat; its topics are servo/state, servo/goal"):
-        read_log(path, time="servo/stat")
+    assert "has no topic servo/stat; its topics are servo/state, servo/goal" in refused(lambda: read_log(path, time="servo/stat"))
 
 
 def test_an_mcap_file_that_is_neither_in_json_nor_of_ros_is_refused_in_one_line(tmp_path: Path) -> None:
@@ -274,9 +274,7 @@ def test_a_file_that_is_no_bag_is_refused_in_one_line(tmp_path: Path, name: str,
     pytest.importorskip("rosbags")
     path = tmp_path / name
     path.write_bytes(content)
-    with pytest.raises(lm.InputError, match="is not a bag that rosbags reads") as refused:
-        read_log(path)
-    assert "\n" not in str(refused.value)
+    assert "is not a bag that rosbags reads" in refused(lambda: read_log(path))
 
 
 def test_damaged_messages_of_ros_are_refused_in_one_line(tmp_path: Path) -> None:
@@ -301,7 +299,7 @@ def test_damaged_messages_of_ros_are_refused_in_one_line(tmp_path: Path) -> None
 def test_stamps_that_messages_do_not_carry_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     as_mcap(path)
-    with pytest.raises(lm.InputError, match=r"message 1 has no header.stamp .* give logs.time = 'servo/goal'"):
+    with refuses(match=r"message 1 has no header.stamp .* give logs.time = 'servo/goal'"):
         read_log(path, time="/servo/goal.header.stamp")
 
 
@@ -409,8 +407,7 @@ def test_a_comma_that_the_task_declares_needs_no_doubt(tmp_path: Path) -> None:
     path.write_text("time;x\n0;1,500\n1;2,250\n")
     log = read_log(path, decimal=",")
     assert log.values("x").tolist() == [1.5, 2.25] and log.notes == ()
-    with pytest.raises(lm.InputError, match="line 2: '1,500' in column x is not a number; write all numbers"):
-        read_log(path, decimal=".")
+    assert "line 2: '1,500' in column x is not a number; write all numbers" in refused(lambda: read_log(path, decimal="."))
     path.write_text("time;x\n0;1,500\n1;0,5\n")  # no number has a nought before thousands
     assert read_log(path).values("x").tolist() == [1.5, 0.5]
 
@@ -480,13 +477,11 @@ def test_a_number_in_brackets_belongs_to_the_name_of_a_column(tmp_path: Path, he
 def test_two_columns_of_one_quantity_are_refused(tmp_path: Path) -> None:
     path = tmp_path / "log.csv"
     path.write_text("time [s],pos (deg),pos (rad)\n0,1,2\n1,3,4\n2,5,6\n")
-    with pytest.raises(lm.InputError, match="has the column 'pos' twice"):
-        read_log(path)
+    assert "has the column 'pos' twice" in refused(lambda: read_log(path))
 
 
 def test_a_pattern_that_names_no_file_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(lm.InputError, match="names no log"):
-        find_logs(["*.json"], tmp_path)
+    refused(lambda: find_logs(["*.json"], tmp_path), "logs.files")
 
 
 def log_of(time: np.ndarray = TIME, header: dict[str, Any] | None = None, **channels: np.ndarray) -> Log:
@@ -558,9 +553,7 @@ REFUSED: dict[str, tuple[Log, str]] = {
 @pytest.mark.parametrize("what", REFUSED)
 def test_a_log_that_cannot_be_used_is_refused_in_one_line(what: str) -> None:
     log, text = REFUSED[what]
-    with pytest.raises(lm.InputError, match=text) as refused:
-        screened(log, ["position"], ["goal"])
-    assert str(refused.value).startswith("log.json: ") and "\n" not in str(refused.value)
+    assert refused(lambda: screened(log, ["position"], ["goal"]), match=text).startswith("log.json: ")
 
 
 FILES: dict[str, tuple[str, bytes | str, str]] = {
@@ -610,6 +603,4 @@ def test_a_file_that_cannot_be_read_is_refused_in_one_line(what: str, tmp_path: 
     name, content, text = FILES[what]
     path = tmp_path / name
     path.write_bytes(content if isinstance(content, bytes) else content.encode())
-    with pytest.raises(lm.InputError, match=text) as refused:
-        read_log(path)
-    assert str(refused.value).startswith(str(path)) and "\n" not in str(refused.value)
+    assert refused(lambda: read_log(path), match=text).startswith(str(path))

@@ -10,6 +10,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.identification.readers.log_files import read_log
+from refusals import refused
 
 TIME = np.round(np.arange(60) * 0.002, 3)
 X, Y = np.round(np.sin(20 * TIME), 6), np.round(np.cos(30 * TIME), 6)
@@ -55,8 +56,7 @@ def test_a_column_of_words_is_left_out_and_named(tmp_path: Path) -> None:
 
 def test_many_damaged_lines_are_refused(tmp_path: Path) -> None:
     lines = [line if k % 5 else line[:8] for k, line in enumerate(rows())]
-    with pytest.raises(lm.InputError, match="for 3 columns"):
-        read(tmp_path / "a.csv", ["time,x,y", *lines])
+    assert "for 3 columns" in refused(lambda: read(tmp_path / "a.csv", ["time,x,y", *lines]))
 
 
 def test_quoted_names_with_units_behind_blanks(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 import lostmotion as lm
 from conftest import some
 from lostmotion.errors import InputError
+from refusals import refused
 
 Vector = NDArray[np.float64]
 
@@ -357,8 +358,7 @@ def test_step_by_step_it_is_the_same() -> None:
     ],
 )
 def test_what_is_no_law_of_flanks_is_refused(stiffness: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        pair(0.5).replace(**{"gears.mesh.stiffness": stiffness})
+    refused(lambda: pair(0.5).replace(**{"gears.mesh.stiffness": stiffness}), match=said)
 
 
 @pytest.mark.parametrize(
@@ -372,8 +372,7 @@ def test_what_is_no_law_of_flanks_is_refused(stiffness: dict[str, Any], said: st
     ],
 )
 def test_what_impacts_do_not_cover_is_refused(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        pair(0.5).replace(**changes)
+    refused(lambda: pair(0.5).replace(**changes), match=said)
 
 
 def test_explanations_and_events_name_flanks_and_impacts() -> None:

@@ -22,7 +22,7 @@ from lostmotion.reports.servo import servo_report
 from lostmotion.simulation.forms.dotted_keys import set_values
 from lostmotion.simulation.forms.train_tables import train_schema
 from lostmotion.units.conversion import to_si
-from refusals import refuses
+from refusals import refused, refuses
 
 SCREW = """
 title = "Ball-screw axis"
@@ -214,8 +214,7 @@ def test_a_preloaded_belt_loses_half_of_its_stiffness_where_a_strand_goes_slack(
     curve = made.gear("a", "b").stiffness
     for deflection, force in ((20e-6, 80.0), (50e-6, 200.0), (90e-6, 280.0), (-90e-6, -280.0)):
         assert float(curve.torque(deflection)) == pytest.approx(force, rel=1e-12)
-    with pytest.raises(lm.InputError, match=r"a preload takes two strands of the same length"):
-        lm.model.Belt(**belt, free_lengths=["500 mm", "400 mm"], preload="100 N")
+    assert "a preload takes two strands of" in refused(lambda: lm.model.Belt(**belt, free_lengths=["500 mm", "400 mm"], preload="100 N"))
 
 
 def test_a_shaft_without_inertia_has_the_key_of_the_short_form():
@@ -280,8 +279,7 @@ def test_cogging_swings_as_a_pendulum():
         # The cubics between samples err by (2 pi/200)^4/384 of the amplitude, alike in each period.
         found = (crossings[-1] - crossings[0]) / (len(crossings) - 1)
         assert found == pytest.approx(period, rel=within)
-    with pytest.raises(lm.InputError, match="cogging_error"):
-        lm.model.LinearMotor(slide="x", rated_force=1.0, cogging_error=0.1)
+    assert "cogging_error" in refused(lambda: lm.model.LinearMotor(slide="x", rated_force=1.0, cogging_error=0.1))
 
 
 def test_position_gain_in_metres_a_minute_to_a_millimetre():
@@ -309,10 +307,7 @@ def test_position_gain_in_metres_a_minute_to_a_millimetre():
     ],
 )
 def test_bad_input_is_refused(changes, message):
-    with pytest.raises(lm.InputError) as refused:
-        screw(**changes)
-    assert message in str(refused.value)
-    assert "\n" not in str(refused.value)
+    assert message in refused(lambda: screw(**changes))
 
 
 @pytest.mark.parametrize(
@@ -444,10 +439,9 @@ def test_linear_scale_reads_its_grating_in_steps():
     ],
 )
 def test_bad_input_in_the_short_form_is_refused_with_its_keys(changes, message):
-    with pytest.raises(lm.InputError) as refused:
-        axis(**changes)
-    assert message in str(refused.value)
-    assert "controllers." not in str(refused.value)
+    told = refused(lambda: axis(**changes))
+    assert message in told
+    assert "controllers." not in told
 
 
 # What measures a turn or a torque.
@@ -561,9 +555,9 @@ def test_one_speed_of_a_rigid_train_says_the_others(initial):
 
 
 def test_speeds_that_contradict_each_other_are_refused_with_both():
-    with pytest.raises(lm.InputError, match=r"head: -0.3 m/s does not fit motor = 5 rad/s") as error:
-        lm.Scenario(**FALLING, initial={"speeds": {"motor": 5.0}, "slide_speeds": {"head": -0.3}})
-    assert f"{5.0 * TRAVEL / 2.0:.10g} m/s" in str(error.value)
+    assert f"{5.0 * TRAVEL / 2.0:.10g} m/s" in refused(
+        lambda: lm.Scenario(**FALLING, initial={"speeds": {"motor": 5.0}, "slide_speeds": {"head": -0.3}}), "initial.slide_speeds.head"
+    )
 
 
 def test_one_speed_of_a_rigid_drive_says_the_other():
@@ -572,8 +566,7 @@ def test_one_speed_of_a_rigid_drive_says_the_other():
         result = lm.simulate(drive.replace(**{f"initial.{key}": 7.0}))
         assert float(result[key][0]) == 7.0
         assert float(result["motor_speed"][0]) == drive.gearbox.ratio * float(result["load_speed"][0])
-    with pytest.raises(lm.InputError, match=r"6.*7"):
-        drive.replace(**{"initial.motor_speed": 7.0, "initial.load_speed": 6.0})
+    refused(lambda: drive.replace(**{"initial.motor_speed": 7.0, "initial.load_speed": 6.0}), "initial.load_speed")
 
 
 @pytest.mark.parametrize("stiffness", [None, "100 N/um"])

@@ -20,6 +20,7 @@ from lostmotion.live_page.description import describe
 from lostmotion.portable.derivation import derivation_of
 from lostmotion.portable.descriptions import numbers_of
 from lostmotion.simulation.forms.dotted_keys import set_values
+from refusals import refused
 
 AXIS = """title = "A slide with a linear motor"
 [slides.table]
@@ -169,9 +170,8 @@ def test_what_a_description_for_other_programs_names_has_none() -> None:
 def test_messages_about_slides_have_none_but_what_was_given(changes: dict[str, Any], message: str) -> None:
     tables = tomllib.loads(AXIS + COMMAND + RUN)
     set_values(tables, changes.items())
-    with pytest.raises(InputError) as refused:
-        lm.Scenario.model_validate(tables)
-    said = str(refused.value)
+    told = refused(lambda: lm.Scenario.model_validate(tables))
+    said = told
     assert message in said
     given = [value for value in changes.values() if isinstance(value, str)]
     for value in given:
@@ -187,13 +187,11 @@ def test_speeds_at_the_start_that_do_not_fit_a_rigid_screw_are_named_in_their_un
         "initial": {"speeds": {"motor": 1.0}, "slide_speeds": {"table": 5e-3}},
         "simulation": {"duration": 1.0, "sample_interval": 0.1},
     }
-    with pytest.raises(InputError, match=r"slide_speeds\.table: 0\.005 m/s does not fit motor = 1 rad/s .* makes it 0\.00159\d* m/s"):
-        lm.Scenario.model_validate(tables)
+    refused(lambda: lm.Scenario.model_validate(tables), "initial.slide_speeds.table")
 
 
 def test_a_spectrum_over_revolutions_is_refused_where_nothing_turns() -> None:
-    with pytest.raises(InputError, match=r"motor: .drive. moves the slide table, which makes no revolutions"):
-        lm.spectrum(lm.Scenario.model_validate(tomllib.loads(AXIS + COMMAND + RUN)))
+    assert "makes no revolutions" in refused(lambda: lm.spectrum(lm.Scenario.model_validate(tomllib.loads(AXIS + COMMAND + RUN))))
 
 
 def test_gains_of_a_linear_motor_are_written_in_its_units_beside_the_comments_of_the_file(tmp_path: Path) -> None:

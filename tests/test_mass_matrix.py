@@ -14,7 +14,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from conftest import some
 from lostmotion.simulation.forms.key_aliases import DRIVE
-from refusals import refuses
+from refusals import refused, refuses
 
 SCENARIOS = sorted(Path(__file__).parent.parent.glob("scenarios/*.toml"))
 ARM: dict[str, Any] = {
@@ -237,12 +237,14 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
     assert s.mass_matrices["cart_pole"].matrix == ((3.0, 0.5), (0.5, 0.18))
     r = lm.simulate(s)
     assert np.allclose(3.0 * r.cart_speed + 0.5 * r.pendulum_speed, 0.0, atol=1e-12)
-    with pytest.raises(lm.InputError, match=r"mass_matrices.m.matrix.0.0: .3 kg\*m\^2. has the unit of something else"):
-        lm.Scenario(
+    refused(
+        lambda: lm.Scenario(
             slides={"cart": {"force": 1.0}},
             mass_matrices={"m": {"shafts": ["cart"], "matrix": [["3 kg*m^2"]]}},
             simulation={"duration": 1.0, "sample_interval": 0.25},
-        )
+        ),
+        "mass_matrices.m.matrix.0.0",
+    )
 
 
 @pytest.mark.parametrize(
@@ -265,14 +267,12 @@ def test_a_cart_and_its_pendulum_take_units_by_domain() -> None:
     ],
 )
 def test_what_is_no_mass_matrix_is_refused(matrices: dict[str, Any], message: str) -> None:
-    with pytest.raises(lm.InputError, match=message):
-        scenario(mass_matrices=matrices)
+    refused(lambda: scenario(mass_matrices=matrices), match=message)
 
 
 def test_an_inertia_stated_twice_is_refused() -> None:
     shafts = {"shoulder": {"inertia": 1.5}, "elbow": {}}
-    with pytest.raises(lm.InputError, match=r"mass_matrices.arm: holds the inertia of shaft 'shoulder', .* its own, 1.5 kg\*m\^2; leave"):
-        scenario(shafts=shafts)
+    refused(lambda: scenario(shafts=shafts), "mass_matrices.arm")
 
 
 def test_the_eigenvalue_in_the_message_is_that_of_lapack() -> None:
@@ -373,8 +373,7 @@ def test_a_step_with_no_mass_matrix_is_refused_and_changes_nothing(matrix: Any, 
     simulation = lm.Simulation(scenario())
     simulation.advance(0.1, shoulder_load_torque=-1.0)
     before = simulation.read()
-    with pytest.raises(lm.InputError, match=message):
-        simulation.advance(0.1, mass_matrix=matrix)
+    refused(lambda: simulation.advance(0.1, mass_matrix=matrix), match=message)
     assert simulation.read() == before
     assert simulation.time == 0.1
 

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.errors import InputError
+from refusals import refused, refuses
 
 FIRST = {"k": 800.0, "c": 3.0}
 SECOND = {"k": 2000.0, "c": 0.5}
@@ -177,7 +177,7 @@ def test_between_shafts_that_a_mass_matrix_couples() -> None:
         scale = float(np.abs(expected).max())
         np.testing.assert_allclose(result[name].values, expected, rtol=0.0, atol=1e-11 * scale, err_msg=name)
     assert abs(lm.energy_of(result)["residual"]) < 1e-12 * lm.energy_of(result)["turned_over"]
-    with pytest.raises(InputError, match=r"mass_matrices\.arm: has no inertia of shaft 'node' on its diagonal; give one"):
+    with refuses("mass_matrices.arm"):
         chain().replace(**{"shafts.b": {}, "mass_matrices": {"arm": {"shafts": ["b", "node"], "matrix": [[0.3, 0.0], [0.0, 0.0]]}}})
 
 
@@ -205,8 +205,7 @@ def test_step_by_step_and_as_a_whole_it_is_the_same() -> None:
     ],
 )  # fmt: skip
 def test_what_has_no_unique_motion_is_refused_with_the_remedy(changes: dict[str, Any], said: str) -> None:
-    with pytest.raises(InputError, match=said):
-        chain().replace(**changes)
+    refused(lambda: chain().replace(**changes), match=said)
 
 
 @pytest.mark.parametrize("seed", range(some(20, 8)))

@@ -16,6 +16,7 @@ from conftest import some
 from lostmotion.cli.entry import app
 from lostmotion.identification.monitor.change_detection import SIZES, _log_factors, find_change
 from lostmotion.identification.monitor.monitor import LogEstimate, _in_units_of_baseline
+from refusals import refused
 
 JOINT = """
 [shafts.motor]
@@ -194,8 +195,7 @@ def test_a_table_that_cannot_be_used_is_refused(worn: Path, change: dict[str, An
     task = write_task(worn.parent, TASK | {"monitor": TASK["monitor"] | change})
     task.rename(path)
     write_task(worn.parent, TASK)
-    with pytest.raises(lm.InputError, match=message):
-        lm.monitor(path)
+    refused(lambda: lm.monitor(path), match=message)
 
 
 # --- statistics ---

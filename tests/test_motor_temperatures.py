@@ -11,6 +11,7 @@ import lostmotion as lm
 from lostmotion.data_sheets.components import motor_table
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.thermal import COPPER, TwoBodies, mean_square
+from refusals import refused
 
 THERMAL = {
     "thermal_resistance_winding_case": "0.8 K/W",
@@ -261,8 +262,7 @@ def test_synchronous_records_follow_from_their_sheets() -> None:
     ],
 )  # fmt: skip
 def test_what_lacks_or_contradicts_is_named(call, message) -> None:
-    with pytest.raises(lm.InputError, match=message):
-        call(lm.simulate(run(0.1, duration=2.0)))
+    refused(lambda: call(lm.simulate(run(0.1, duration=2.0))), match=message)
 
 
 def test_a_motor_of_a_train_is_chosen_by_name() -> None:
@@ -279,7 +279,5 @@ def test_a_motor_of_a_train_is_chosen_by_name() -> None:
     expected = lm.sizing.temperatures(lm.simulate(single))
     assert of_one["winding_temperature"].values == pytest.approx(expected["winding_temperature"].values, rel=1e-12)
     assert float(lm.sizing.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
-    with pytest.raises(lm.InputError, match="motor is missing; the motors are one, two"):
-        lm.sizing.temperatures(result)
-    with pytest.raises(lm.InputError, match="motor 'onw': the motors are one, two"):
-        lm.sizing.motor_current(result, "onw")
+    assert "motor is missing; the motors are one, two" in refused(lambda: lm.sizing.temperatures(result))
+    assert "motor 'onw': the motors are one, two" in refused(lambda: lm.sizing.motor_current(result, "onw"))

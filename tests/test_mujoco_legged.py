@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from refusals import refused
 from test_examples import example
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
@@ -165,8 +166,7 @@ def test_an_equality_couples_two_joints() -> None:
 
 def test_a_free_joint_and_a_missing_library_are_refused(legged: Any, monkeypatch: pytest.MonkeyPatch) -> None:
     model = mujoco.MjModel.from_xml_string(legged.mjcf())
-    with pytest.raises(lm.InputError, match="joint 'trunk': is neither a hinge nor a slide"):
-        lm.mujoco.attach(model, {"trunk": drive()})
+    assert "joint 'trunk': is neither a hinge nor a slide" in refused(lambda: lm.mujoco.attach(model, {"trunk": drive()}))
     monkeypatch.setitem(sys.modules, "mujoco", None)
     with pytest.raises(lm.MissingLibraryError, match="mujoco") as caught:
         lm.mujoco.attach("robot.xml", {"elbow": drive()})
@@ -178,8 +178,7 @@ def test_a_value_of_the_trunk_that_is_no_number_is_named(legged: Any, name: str,
     robot = legged.robot("quasi-direct")
     robot.step()
     getattr(robot.data, name)[place] = math.nan
-    with pytest.raises(lm.InputError, match=rf"data\.{name}: value {place} is nan; give finite numbers"):
-        robot.step()
+    refused(robot.step, match=rf"data\.{name}: value {place} is nan; give finite numbers")
     robot.reset()
     robot.step()
 
@@ -187,8 +186,8 @@ def test_a_value_of_the_trunk_that_is_no_number_is_named(legged: Any, name: str,
 def test_a_second_drive_of_a_joint_is_refused() -> None:
     """A dictionary has one drive a joint; the second would be an actuator of the model."""
     text = ARM.format(step=1e-3, world="", tip="").replace("</mujoco>", "<actuator><motor name='again' joint='elbow'/></actuator></mujoco>")
-    with pytest.raises(lm.InputError, match="joint 'elbow': has the actuator 'again', which would count twice"):
-        lm.mujoco.attach(mujoco.MjModel.from_xml_string(text), {"elbow": drive()})
+    model = mujoco.MjModel.from_xml_string(text)
+    assert "joint 'elbow': has the actuator 'again', which would" in refused(lambda: lm.mujoco.attach(model, {"elbow": drive()}))
 
 
 def test_an_encoder_on_the_joint_hunts_in_the_arm_as_alone() -> None:

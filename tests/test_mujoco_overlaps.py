@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from refusals import refused
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
 
@@ -70,9 +71,7 @@ def test_weight_and_load_of_the_joint_are_refused_or_left_to_the_robot(key: str,
         pytest.skip("a train has no load torque")
     given = scenario(**WEIGHTS[key], **({"controllers": {"m": CONTROLLER}} if form == "controlled" else {}))
     given = given.train() if form == "train" else given
-    with pytest.raises(lm.InputError, match="would count twice") as caught:
-        lm.mujoco.attach(model(), {"arm": given})
-    assert caught.value.problems[0].keys == (key,)
+    refused(lambda: lm.mujoco.attach(model(), {"arm": given}), key)
     arm = lm.mujoco.attach(model(), {"arm": given}, replace=True)
     plain = scenario(**({"controllers": {"m": CONTROLLER}} if form == "controlled" else {}))
     once = lm.mujoco.attach(model(), {"arm": plain})
@@ -96,9 +95,7 @@ def test_the_load_torque_of_a_short_form_is_refused() -> None:
         lm.mujoco.attach(model(), {"arm": given})
     assert caught.value.problems[0].keys == ("load.torque",)
     lm.mujoco.attach(model(), {"arm": given}, replace=True).step()
-    with pytest.raises(lm.InputError) as caught:
-        lm.mujoco.write_drive(given, "never-written")
-    assert caught.value.problems[0].keys == ("load.torque",)
+    refused(lambda: lm.mujoco.write_drive(given, "never-written"), "load.torque")
 
 
 def test_the_weight_of_a_drive_acts_where_the_robot_has_none() -> None:
@@ -172,8 +169,7 @@ def test_end_stops_of_joint_and_drive_are_refused_or_those_of_the_drive_stay() -
 def test_springs_of_joint_and_drive_are_refused_or_those_of_the_drive_stay() -> None:
     spring = {"end": {"shaft": "arm", "stiffness": {"kind": "linear", "stiffness": 2.0}}}
     sprung = model(joint='stiffness="3"')
-    with pytest.raises(lm.InputError, match="has stiffness, which would count twice"):
-        lm.mujoco.attach(sprung, {"arm": scenario(springs=spring)})
+    assert "has stiffness, which would count twice" in refused(lambda: lm.mujoco.attach(sprung, {"arm": scenario(springs=spring)}))
     assert lm.mujoco.attach(sprung, {"arm": scenario()}).model.jnt_stiffness[0] == 3.0
     arm = lm.mujoco.attach(sprung, {"arm": scenario(springs=spring)}, replace=True)
     assert arm.model.jnt_stiffness[0] == 0.0
@@ -200,8 +196,7 @@ ACTUATORS = {
 def test_nothing_of_an_actuator_stays_beside_its_drive(kind: str) -> None:
     tendon = '<tendon><fixed name="rope"><joint joint="arm" coef="9"/></fixed></tendon>'
     given = model(joint='damping="0.1 0.2 0.3" actuatorfrcrange="-1 1"', actuator=f"{tendon}<actuator>{ACTUATORS[kind]}</actuator>")
-    with pytest.raises(lm.InputError, match="damping and actuatorfrcrange and the actuator 'a', which would count twice"):
-        lm.mujoco.attach(given, {"arm": scenario()})
+    assert "damping and actuatorfrcrange and the actuator 'a', which" in refused(lambda: lm.mujoco.attach(given, {"arm": scenario()}))
     arm, plain = (lm.mujoco.attach(given, {"arm": scenario()}, replace=True), lm.mujoco.attach(model(), {"arm": scenario()}))
     arm.data.ctrl[:] = 0.7
     for robot in (arm, plain):
@@ -215,19 +210,16 @@ def test_nothing_of_an_actuator_stays_beside_its_drive(kind: str) -> None:
 def test_an_actuator_without_a_name_is_named_by_its_number() -> None:
     motor = '<motor joint="arm"/>'
     unnamed = model(actuator=f"<actuator>{motor}{motor}</actuator>")
-    for refused in (lambda: lm.mujoco.attach(unnamed, {"arm": scenario()}), lambda: lm.mujoco.from_mjcf(unnamed, "arm")):
-        with pytest.raises(lm.InputError, match=r"\(number 1 of 2\) and the actuator without a name \(number 2 of 2\)"):
-            refused()
+    for use in (lambda: lm.mujoco.attach(unnamed, {"arm": scenario()}), lambda: lm.mujoco.from_mjcf(unnamed, "arm")):
+        assert "(number 1 of 2) and the actuator without a name (number 2 of 2)" in refused(use)
 
 
 def test_what_cannot_be_taken_off_is_refused() -> None:
     with pytest.raises(lm.InputError, match="actuatorgravcomp"):
         lm.mujoco.attach(model(body='gravcomp="1"', joint='actuatorgravcomp="true"'), {"arm": scenario()}, replace=True)
     delayed = '<actuator><motor name="a" joint="arm" nsample="4" delay="4e-3"/></actuator>'
-    with pytest.raises(lm.InputError, match="actuators with a delay"):
-        lm.mujoco.attach(model(actuator=delayed), {"arm": scenario()}, replace=True)
-    with pytest.raises(lm.InputError, match="springs that yield"):
-        lm.mujoco.attach(model(joint='stiffness="3" springyield="0.1"'), {"arm": scenario()})
+    assert "actuators with a delay" in refused(lambda: lm.mujoco.attach(model(actuator=delayed), {"arm": scenario()}, replace=True))
+    assert "springs that yield" in refused(lambda: lm.mujoco.attach(model(joint='stiffness="3" springyield="0.1"'), {"arm": scenario()}))
 
 
 @pytest.mark.parametrize(
@@ -241,8 +233,7 @@ def test_what_cannot_be_taken_off_is_refused() -> None:
     ],
 )  # fmt: skip
 def test_what_a_robot_cannot_move_is_refused_by_name(more: dict[str, Any], message: str) -> None:
-    with pytest.raises(lm.InputError, match=message):
-        lm.mujoco.attach(model(), {"arm": scenario(**more)})
+    refused(lambda: lm.mujoco.attach(model(), {"arm": scenario(**more)}), match=message)
 
 
 def test_an_arm_behind_a_safety_clutch_is_the_joint() -> None:

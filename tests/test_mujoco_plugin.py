@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from refusals import refused
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
 
@@ -128,8 +129,7 @@ def test_a_wrong_configuration_ends_in_one_clear_line(options: dict[str, Any], m
 
 def test_loads_and_weights_of_a_scenario_are_taken_off_where_the_robot_has_them(tmp_path: Path) -> None:
     loaded = lm.load("lossy-rigid-gear")
-    with pytest.raises(lm.InputError, match=r"load\.torque: would count twice"):
-        lm.mujoco.write_drive(loaded, tmp_path / "one")
+    assert "load.torque: would count twice" in refused(lambda: lm.mujoco.write_drive(loaded, tmp_path / "one"))
     without = loaded.replace(**{"load.torque": {}})
     assert lm.mujoco.write_drive(loaded, tmp_path / "x", replace=True) == lm.mujoco.write_drive(without, tmp_path / "x")
 
@@ -242,8 +242,7 @@ def test_a_motor_without_a_gear_turns_a_joint_by_its_torque(tmp_path: Path) -> N
 
 def test_of_two_ends_the_one_with_the_name_of_the_joint_is_turned(tmp_path: Path) -> None:
     ends = TRAIN | {"gears": TRAIN["gears"] | {"bevel": {"input": "worm", "output": "flywheel", "ratio": -0.5}}}
-    with pytest.raises(lm.InputError, match="the train ends at joint, flywheel; call the shaft"):
-        lm.mujoco.write_drive(lm.DriveTrain(**ends), tmp_path / "x")
+    assert "the train ends at joint, flywheel; call the" in refused(lambda: lm.mujoco.write_drive(lm.DriveTrain(**ends), tmp_path / "x"))
     shafts = {"hinge" if name == "joint" else name: shaft for name, shaft in TRAIN["shafts"].items()}
     gears = ends["gears"] | {"worm": ends["gears"]["worm"] | {"output": "hinge"}}
     model = hinge(ends | {"shafts": shafts, "gears": gears}, tmp_path, 1e-3)

@@ -18,6 +18,7 @@ from lostmotion import _core
 from lostmotion.inputs.cached_values import kept_while_used
 from lostmotion.inputs.part import Part
 from lostmotion.simulation.runs.result_files import FORMATS
+from refusals import refused
 
 NAMED = {path.stem: path for path in ALL_SCENARIOS}
 BOTH_FORMS = ("paper-2dof-nl-small", "worm-lowering")
@@ -163,8 +164,7 @@ def test_arrays_cannot_be_changed() -> None:
     ],
 )
 def test_another_form_of_the_result_is_refused(given: dict[str, Any], message: str) -> None:
-    with pytest.raises(lm.InputError, match=message):
-        lm.simulate(loaded("paper-2dof-nl-small"), **given)
+    refused(lambda: lm.simulate(loaded("paper-2dof-nl-small"), **given), match=message)
 
 
 # --- the ledger ---
@@ -199,8 +199,7 @@ def test_a_balance_that_does_not_close_is_reported_in_files_and_summaries(tmp_pa
 
 def test_the_adaptive_solver_and_a_law_that_is_gone_have_no_ledger() -> None:
     result = lm.simulate(loaded("paper-2dof-nl-small"), solver="dormand-prince")
-    with pytest.raises(lm.InputError, match="has no energy ledger"):
-        lm.energy_of(result)
+    assert "has no energy ledger" in refused(lambda: lm.energy_of(result))
 
 
 def test_a_run_under_a_law_carries_its_ledger() -> None:
@@ -211,5 +210,4 @@ def test_a_run_under_a_law_carries_its_ledger() -> None:
     controller = {k: tables["controller"][k] for k in ("sample_time", "reference")} | {"encoder": {"ideal": True}}
     scenario = lm.Scenario(**{**tables, "controller": {**controller, "law": True}})
     assert lm.energy_of(lm.simulate(scenario, law=law))["source"] != 0.0
-    with pytest.raises(lm.InputError, match="has no energy ledger"):
-        lm.energy_of(lm.simulate(scenario, law=law, energy=False))
+    assert "has no energy ledger" in refused(lambda: lm.energy_of(lm.simulate(scenario, law=law, energy=False)))

@@ -19,6 +19,7 @@ from conftest import ROOT, SCENARIOS
 from lostmotion.inputs.part import Part
 from lostmotion.reports import thinning
 from public_names import FLAT, NAMESPACES, PATHS, public
+from refusals import refused
 
 SMALL = lm.load("paper-2dof-nl-small")
 
@@ -54,8 +55,7 @@ def test_a_scenario_brings_its_constant_inputs_and_its_start_along() -> None:
 
 
 def test_what_is_no_drive_is_refused_in_plain_words() -> None:
-    with pytest.raises(lm.InputError, match=r'drive: "drive.toml" must be a Drive, or a Scenario, such as load\(path\) returns'):
-        lm.response.bandwidth("drive.toml", 1.0)
+    assert 'drive: "drive.toml" must be a Drive, or a Scenario, such as' in refused(lambda: lm.response.bandwidth("drive.toml", 1.0))
 
 
 # --- pickling, showing ---
@@ -233,8 +233,7 @@ def test_several_variables_come_as_an_array_and_a_wrong_name_is_told() -> None:
     pair = simulation["load_speed", "efficiency"]
     assert pair.tolist() == [simulation["load_speed"], simulation["efficiency"]]
     assert simulation[["load_speed", "efficiency"]].tolist() == pair.tolist()
-    with pytest.raises(lm.InputError, match='"load_sped" is no variable; did you mean load_speed\\?'):
-        simulation["load_sped"]
+    assert '"load_sped" is no variable; did you mean load_speed?' in refused(lambda: simulation["load_sped"])
 
 
 def test_reset_gives_the_same_motion_again() -> None:

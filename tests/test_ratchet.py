@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.errors import InputError
+from refusals import refused
 
 J_1, J_2, T, AHEAD = 0.2, 0.5, 3.0, 9.0
 
@@ -78,5 +78,4 @@ def test_solvers_and_steps_agree() -> None:
 
 
 def test_what_takes_no_impacts_says_so() -> None:
-    with pytest.raises(InputError, match=r"ratchets\.ratchet"):
-        lm.linearize(handle(7))
+    assert "ratchets.ratchet" in refused(lambda: lm.linearize(handle(7)))

@@ -23,6 +23,7 @@ from lostmotion.inputs.part import Part
 from lostmotion.live_page.references import reference_view
 from lostmotion.model.signals import taylor
 from lostmotion.simulation.scenario import scenario_files
+from refusals import refused
 
 EPS = np.finfo(float).eps
 DEG = math.pi / 180.0
@@ -412,16 +413,12 @@ def test_the_good_reference_is_one() -> None:
 
 @pytest.mark.parametrize(("change", "sentence"), BAD, ids=[s for _, s in BAD])
 def test_a_reference_that_cannot_be_is_refused_in_one_line(change: dict[str, object], sentence: str) -> None:
-    with pytest.raises(lm.InputError) as caught:
-        lm.PositionReference(**GOOD | change)
-    assert sentence in str(caught.value)
-    assert "\n" not in str(caught.value)
+    assert sentence in refused(lambda: lm.PositionReference(**GOOD | change))
 
 
 @pytest.mark.parametrize("time", [-1.0, math.nan, math.inf, "1 s", None, [0.0, -1e-9], [[0.0], [1.0, 2.0]]])
 def test_a_reference_is_asked_at_times_from_0_on(time: object) -> None:
-    with pytest.raises(lm.InputError, match=r"^time: "):
-        LIST.at(time)
+    refused(lambda: LIST.at(time), match=r"^time: ")
 
 
 extremes = st.floats(allow_subnormal=True) | st.sampled_from([0.0, 1e-320, 1e-300, 1e300, 1.7e308]) | st.none()

@@ -27,6 +27,7 @@ from lostmotion.reports.static import svg_of
 from lostmotion.reports.thinning import simplified
 from lostmotion.units.practical import ARCMIN, practical
 from lostmotion.verdict import Verdict
+from refusals import refused
 
 X = np.geomspace(1.0, 1000.0, 50)
 PANEL = Panel("gain", "frequency [Hz]", "[-]", (Curve("one", X, 10.0 / X, look(0)),), log_x=True, log_y=True, level=1.0,
@@ -186,8 +187,7 @@ def test_figures_are_drawn_where_they_are_asked_for(axis: lm.servo.ServoReport, 
     assert made == {"servo.html", "margins.csv"} | {f"{n}.{e}" for n in ("axis", "loops", "steps") for e in ("csv", "png", "svg")}
     assert (tmp_path / "axis.png").read_bytes().startswith(b"\x89PNG")
     assert endings(None) == ()
-    with pytest.raises(lm.InputError, match="gif is not known; write png, svg or pdf"):
-        endings("png,gif")
+    assert "gif is not known; write png, svg or pdf" in refused(lambda: endings("png,gif"))
 
 
 def test_a_report_takes_no_plotting_library_along() -> None:

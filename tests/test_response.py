@@ -18,6 +18,7 @@ from lostmotion.cli.grids import parse_grid
 from lostmotion.paper import paper_scenario
 from lostmotion.response.rigid import rigid_constants
 from lostmotion.response.shooting import PERIODICITY
+from refusals import refused
 
 NONLINEAR = paper_scenario("2-DOF-NL", "large").drive()
 
@@ -145,10 +146,8 @@ def test_linearisation_holds_where_the_input_sticks():
 
 
 def test_without_an_operating_point_only_a_drive_of_one_regime_is_linearized():
-    with pytest.raises(lm.InputError, match=r"\(dry contacts: input_contact, twist_contact, a torsion curve of .*give one"):
-        lm.linearize(NONLINEAR)
-    with pytest.raises(lm.InputError, match="depends on the operating point"):
-        lm.linearize(NONLINEAR, command=0.4)
+    refused(lambda: lm.linearize(NONLINEAR), match=r"\(dry contacts: input_contact, twist_contact, a torsion curve of .*give one")
+    assert "depends on the operating point" in refused(lambda: lm.linearize(NONLINEAR, command=0.4))
     linear = frictionless("2-DOF-L")
     moving = lm.Initial(motor_speed=-70.0, load_speed=2.0, twist=-3e-3)
     assert np.array_equal(lm.linearize(linear).A, lm.linearize(linear, moving, command=0.4).A)
@@ -184,8 +183,7 @@ def test_scipy_and_control_get_the_same_model():
         assert np.array_equal(getattr(own, name), getattr(model, name))
     assert own.input_labels == ["command", "load_torque"]
     assert own.output_labels[2] == "load_speed"
-    with pytest.raises(lm.InputError, match='there is no "load_sped"'):
-        model.response(1.0, "load_sped")
+    assert 'there is no "load_sped"' in refused(lambda: model.response(1.0, "load_sped"))
 
 
 # --- periodic motion ---

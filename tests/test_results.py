@@ -10,6 +10,7 @@ import xarray as xr
 import lostmotion as lm
 from lostmotion.simulation.runs.energy_ledger import largest_stored, with_energy
 from lostmotion.simulation.variables import VARIABLES
+from refusals import refused
 
 
 @pytest.fixture(scope="module")
@@ -107,8 +108,7 @@ def test_a_csv_file_that_is_cut_at_the_end_of_a_line_is_refused(result: xr.Datas
         with pytest.raises(lm.InputError, match=words):
             lm.open_result(tmp_path / "cut.csv")
     (tmp_path / "cut.csv").write_text("".join([*lines, lines[-1]]))
-    with pytest.raises(lm.InputError, match="2002 of the 2001 samples"):
-        lm.open_result(tmp_path / "cut.csv")
+    assert "2002 of the 2001 samples" in refused(lambda: lm.open_result(tmp_path / "cut.csv"))
 
 
 def test_a_csv_file_without_the_number_of_its_samples_is_refused(result: xr.Dataset, tmp_path: Path) -> None:

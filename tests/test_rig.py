@@ -12,6 +12,7 @@ from lostmotion.data_sheets.records import find
 from lostmotion.model.losses import efficiency_map
 from lostmotion.test_rig.comparison import compare
 from lostmotion.test_rig.virtual_rig import TestRig
+from refusals import refused
 from sheets import ARCMIN, COMPLETE, RPM, gearbox_of, sheet
 
 
@@ -60,13 +61,11 @@ def test_a_rigid_gearbox_is_measured_but_for_its_torsion():
     assert rig.starting_torque() == pytest.approx(0.037, rel=1e-6)
     assert rig.backdriving_torque() == pytest.approx(3.89, rel=1e-6)
     assert rig.lost_motion() == 0.0
-    with pytest.raises(lm.InputError, match="a rigid gearbox has no torsion to measure"):
-        rig.loop(52.0)
+    assert "a rigid gearbox has no torsion to measure" in refused(lambda: rig.loop(52.0))
 
 
 def test_a_rigid_sheet_has_no_twist():
-    with pytest.raises(lm.InputError, match="is rigid and has backlash"):
-        sheet(stiffness=None, rigid=True, backlash="1 arcmin")
+    assert "is rigid and has backlash" in refused(lambda: sheet(stiffness=None, rigid=True, backlash="1 arcmin"))
 
 
 @pytest.mark.parametrize("stiffness", [{"kind": "rigid"}, {"kind": "linear", "stiffness": 100.0}])

@@ -13,6 +13,7 @@ from lostmotion.servo.hunting.quantised_slip_end import loudest
 from lostmotion.servo.hunting.sampled_proof import end_of_slip
 from lostmotion.servo.hunting.sampled_stuck_contact import sampled_slip
 from lostmotion.servo.linear_regimes import axis_of
+from refusals import refused
 
 INERTIA, SLIDING, TICK = 0.5, 2.0, 1e-3
 K_V, K_P, K_I = 5.0, 20.0, 40.0
@@ -209,8 +210,7 @@ def test_losses_that_grow_with_the_load_alone_are_no_constant_friction() -> None
 
 def test_of_several_axes_the_one_that_is_named_is_certified() -> None:
     scenario = lm.load("direction-finder")
-    with pytest.raises(lm.InputError, match="motor: there are several controllers"):
-        lm.hunting_certificate(scenario)
+    assert "motor: there are several controllers" in refused(lambda: lm.hunting_certificate(scenario))
     for motor in scenario.axes():
         assert lm.hunting_certificate(scenario, motor=motor).verdict == "not decided"
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from refusals import refused
 
 LINKS: dict[str, Any] = {
     "shafts": {
@@ -78,5 +79,4 @@ def test_an_entry_off_the_diagonal_is_set_on_both_sides() -> None:
     scenario = lm.Scenario(**LINKS)
     changed = scenario.replace(**{"mass_matrices.arm.matrix.0.1": 0.5})
     assert changed.mass_matrices["arm"].matrix == ((2.6, 0.5), (0.5, 0.4))
-    with pytest.raises(lm.InputError, match=r"between shaft 'shoulder' and shaft 'elbow' it has 0.5 and 0.6"):
-        scenario.replace(**{"mass_matrices.arm.matrix.0.1": 0.5, "mass_matrices.arm.matrix.1.0": 0.6})
+    refused(lambda: scenario.replace(**{"mass_matrices.arm.matrix.0.1": 0.5, "mass_matrices.arm.matrix.1.0": 0.6}), "mass_matrices.arm")

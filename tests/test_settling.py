@@ -210,7 +210,7 @@ def re_number(text: str, pattern: str) -> float:
 
 # --- random axes against long runs ---
 
-AXES = some(200, 12)
+AXES = some(200, 8)
 LONGER = (5.0, 20.0)  # times as long as what was watched
 LONGEST = 6e6  # samples of a controller, of a long run
 

@@ -19,6 +19,7 @@ from hypothesis import strategies as st
 
 import lostmotion as lm
 from conftest import SCENARIOS
+from refusals import refused, refuses
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
@@ -109,8 +110,7 @@ def test_every_variable_can_be_read_while_stepping(small: Path) -> None:
     run = lm.simulate(scenario, command=0.1, duration=0.3, sample_interval=0.01)
     for variable in lm.simulation.VARIABLES:
         assert sim[variable.name] == pytest.approx(float(run[variable.name][-1]), rel=1e-9)
-    with pytest.raises(lm.InputError, match="load_sped"):
-        sim["load_sped"]
+    assert "load_sped" in refused(lambda: sim["load_sped"])
 
 
 def test_a_bad_step_is_refused_and_changes_nothing(small: Path) -> None:
@@ -234,24 +234,21 @@ def test_end_state_continues_a_run(small: Path) -> None:
 @pytest.mark.parametrize("interval", [math.inf, 1e300, 1e-300, 0.0, -1e-3, math.nan])
 def test_intervals_that_no_motion_can_have_are_refused(interval):
     drive = lm.load("paper-2dof-nl-small").drive()
-    with pytest.raises(lm.InputError, match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number"):
-        lm.Simulation(drive, step=interval)
+    refused(lambda: lm.Simulation(drive, step=interval), match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number")
     simulation = lm.Simulation(drive)
-    with pytest.raises(lm.InputError, match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number"):
-        simulation.advance(interval, command=0.1)
+    refused(lambda: simulation.advance(interval, command=0.1), match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number")
     assert simulation.time == 0.0
 
 
 def test_an_interval_below_the_resolution_of_the_time_is_refused():
     simulation = lm.Simulation(lm.load("paper-2dof-nl-small").drive())
     simulation.advance(1e6, command=0.0)
-    with pytest.raises(lm.InputError, match="below the resolution of the time"):
-        simulation.advance(1e-12, command=0.1)
+    assert "below the resolution of the time" in refused(lambda: simulation.advance(1e-12, command=0.1))
 
 
 def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):
     monkeypatch.setattr("lostmotion.inputs.limits.free_memory", lambda: 5_000_000_000)
-    with pytest.raises(lm.InputError, match=r"1e\+08 samples need 18\.3 GB of memory, and 5 GB are free"):
+    with refuses(match=r"1e\+08 samples need 18\.3 GB of memory, and 5 GB are free"):
         lm.simulate(lm.load("paper-2dof-nl-small"), duration=100.0, sample_interval=1.0000001e-6)
 
 

@@ -12,6 +12,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import lostmotion
+from refusals import refused
 
 ARCMIN = math.radians(1.0 / 60.0)
 
@@ -114,14 +115,10 @@ def test_the_error_of_an_encoder_is_found_in_the_following_error() -> None:
 
 def test_what_has_no_spectrum_is_refused() -> None:
     pair = {"pair": gear("motor", "load", 1.0, sine(3, ARCMIN))}
-    with pytest.raises(lm.InputError, match=r"start: the motor makes 0\.318 revolutions .* a whole one is needed"):
-        lm.spectrum(turning(pair, 4.0))
-    with pytest.raises(lm.InputError, match=r"the speed of motor is not constant from 1 s to 2 s"):
-        lm.spectrum(lm.load("paper-2dof-nl-small"))
-    with pytest.raises(lm.InputError, match='against: "load" is not known'):
-        lm.spectrum(turning(pair, 20.0), against="load")
-    with pytest.raises(lm.InputError, match="this axis follows no position reference"):
-        lm.spectrum(turning(pair, 20.0), against="reference")
+    refused(lambda: lm.spectrum(turning(pair, 4.0)), match=r"start: the motor makes 0\.318 revolutions .* a whole one is needed")
+    assert "the speed of motor is not constant from 1 s to 2 s" in refused(lambda: lm.spectrum(lm.load("paper-2dof-nl-small")))
+    assert 'against: "load" is not known' in refused(lambda: lm.spectrum(turning(pair, 20.0), against="load"))
+    assert "this axis follows no position reference" in refused(lambda: lm.spectrum(turning(pair, 20.0), against="reference"))
 
 
 def test_the_command_prints_the_spectrum_and_draws_one_subject(tmp_path: Path) -> None:

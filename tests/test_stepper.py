@@ -9,6 +9,7 @@ from scipy.integrate import solve_ivp
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.command import CommandSignal, Stepping
+from refusals import refused
 from stepper_axes import departure
 
 J, T_H, N = 5e-6, 0.3, 50
@@ -122,9 +123,7 @@ def test_microsteps_have_the_error_of_the_table() -> None:
 
 def test_a_step_rate_beyond_that_of_the_driver_is_refused() -> None:
     command = {"stepping": {"reference": {"moves": [{"to": 1.0}], "speed": 10.0, "acceleration": 1e3}, "max_step_rate": 300.0}}
-    with pytest.raises(lm.InputError, match=r"asks for 318\.3 microsteps a second") as refusal:
-        alone(command)
-    assert refusal.value.problems[0].keys == ("command.m",)
+    refused(lambda: alone(command), "command.m")
 
 
 @pytest.mark.parametrize(
@@ -141,17 +140,13 @@ def test_a_step_rate_beyond_that_of_the_driver_is_refused() -> None:
 )
 def test_a_stepper_that_makes_no_sense_is_refused(change: dict, text: str) -> None:
     given = {key: value for key, value in {**MOTOR, **change}.items() if value is not None}
-    with pytest.raises(lm.InputError, match=text):
-        lm.Motor(**given)
+    refused(lambda: lm.Motor(**given), match=text)
 
 
 def test_keys_of_steppers_and_their_steps_belong_to_steppers() -> None:
-    with pytest.raises(lm.InputError, match='only a motor of kind "stepper"'):
-        lm.Motor(kind="torque_source", rotor_inertia=1e-4, detent_torque=0.1)
+    assert 'only a motor of kind "stepper"' in refused(lambda: lm.Motor(kind="torque_source", rotor_inertia=1e-4, detent_torque=0.1))
     stepping = {"stepping": {"pulses": {"times": [0.1, 0.2], "values": [1, 1]}}}
-    with pytest.raises(lm.InputError, match="stepping") as refusal:
-        lm.load("ball-screw-axis").without_controllers().replace(**{"command.motor": stepping})
-    assert refusal.value.problems[0].keys == ("command",)
+    refused(lambda: lm.load("ball-screw-axis").without_controllers().replace(**{"command.motor": stepping}), "command")
 
 
 def test_current_is_reduced_after_the_delay() -> None:
@@ -204,10 +199,8 @@ def test_energy_of_a_run_that_loses_steps_closes() -> None:
 
 
 def test_a_command_that_is_not_all_steps_is_refused() -> None:
-    with pytest.raises(lm.InputError, match="both turn the field"):
-        CommandSignal(mean=0.1, stepping={"pulses": {"times": [0.1, 0.2], "values": [1, 1]}})
-    with pytest.raises(lm.InputError, match="give one of reference, travel and pulses"):
-        Stepping(reference=0.0, pulses={"times": [0.1, 0.2], "values": [1, 1]})
+    assert "both turn the field" in refused(lambda: CommandSignal(mean=0.1, stepping={"pulses": {"times": [0.1, 0.2], "values": [1, 1]}}))
+    assert "give one of reference, travel and" in refused(lambda: Stepping(reference=0.0, pulses={"times": [0.1, 0.2], "values": [1, 1]}))
 
 
 NEMA_17 = {
@@ -242,8 +235,7 @@ def test_at_a_speed_with_plenty_of_current_the_pull_out_torque_is_the_closed_for
     motor = lm.Motor(**{**NEMA_17, "supply_voltage": 90.0})
     expected = K * (90.0 / Z - K * w * 1.5 / Z**2)
     assert float(lm.sizing.pull_out_torque(motor, w)) == pytest.approx(expected, rel=1e-14)
-    with pytest.raises(lm.InputError, match="supply_voltage"):
-        lm.sizing.pull_out_torque(lm.Motor(**{k: v for k, v in NEMA_17.items() if k != "supply_voltage"}), w)
+    refused(lambda: lm.sizing.pull_out_torque(lm.Motor(**{k: v for k, v in NEMA_17.items() if k != "supply_voltage"}), w), "supply_voltage")
 
 
 def test_lost_steps_are_those_of_an_integration_of_the_sine() -> None:
@@ -432,8 +424,7 @@ def test_the_live_page_draws_the_electrical_angle() -> None:
 def test_step_by_step_the_field_and_the_current_are_named() -> None:
     base = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", {"axis.motor.standstill_current": 0.5})
     simulation = lm.Simulation(base, step=1e-3)
-    with pytest.raises(lm.InputError, match="motor_command, motor_current_command"):
-        simulation.advance(0.01, command=0.01)
+    assert "motor_command, motor_current_command" in refused(lambda: simulation.advance(0.01, command=0.01))
     simulation.advance(0.5, motor_command=0.03, motor_current_command=1.0)
     assert float(simulation["motor_angle"]) == pytest.approx(0.03, abs=2e-3)
 
@@ -475,6 +466,4 @@ def test_the_response_to_the_field_is_that_of_a_rotor_on_its_spring() -> None:
 def test_a_loop_around_a_stepper_is_refused() -> None:
     tables = lm.load("speed-axis").written.model_dump(exclude_none=True)
     tables["motor"] = MOTOR
-    with pytest.raises(lm.InputError, match="turned without a loop") as refusal:
-        lm.Scenario(**tables)
-    assert refusal.value.problems[0].keys == ("controller",)
+    refused(lambda: lm.Scenario(**tables), "controller")

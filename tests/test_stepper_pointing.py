@@ -7,6 +7,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
+from refusals import refused
 
 ARCSEC = math.pi / 648_000.0
 STEPS, T_H, J, RATIO = 400, 0.44, 68e-7, 144.0
@@ -182,5 +183,4 @@ def test_a_short_run_says_why_it_has_no_orders():
 
 def test_a_stepper_under_pulses_has_no_reference_to_point_by():
     scenario = mount().replace(**{"command.ra.stepping": {"pulses": {"times": [0.1, 0.2], "values": [1, 1]}, "microsteps": 4}})
-    with pytest.raises(lm.InputError, match=r"command\.stepping"):
-        lm.pointing_budget(scenario)
+    assert "command.stepping" in refused(lambda: lm.pointing_budget(scenario))

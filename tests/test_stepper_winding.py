@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
+from refusals import refused
 
 NEMA_17 = {
     "kind": "stepper",
@@ -153,16 +154,14 @@ def test_at_rest_a_winding_holds_as_an_ideal_current_does() -> None:
 
 def test_a_winding_is_refused_by_name_where_regimes_are_linear() -> None:
     scenario = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", {"axis.motor.supply_voltage": "24 V"})
-    for refused in (
+    for use in (
         lambda: lm.simulate(scenario, solver="exact"),
         lambda: lm.simulate(scenario, sensitivities=["axis.motor.holding_torque"]),
         lambda: lm.linearize(scenario),
         lambda: lm.Simulation(scenario, step=1e-3),
         lambda: lm.portable.description(scenario),
     ):
-        with pytest.raises(lm.InputError, match="supply_voltage") as refusal:
-            refused()
-        assert refusal.value.problems[0].keys in (("axis.motor.supply_voltage",), ())
+        assert "supply_voltage" in refused(use)
 
 
 def test_the_check_runs_a_winding_and_compares_it_with_its_pull_out_curve() -> None:
@@ -174,5 +173,4 @@ def test_the_check_runs_a_winding_and_compares_it_with_its_pull_out_curve() -> N
 
 @pytest.mark.parametrize("key", ["rated_current", "resistance_phase", "inductance_phase"])
 def test_a_supply_without_the_rest_of_the_winding_is_refused(key: str) -> None:
-    with pytest.raises(lm.InputError, match=f"lacks {key}, which its supply_voltage needs"):
-        lm.Motor(**{k: v for k, v in NEMA_17.items() if k != key})
+    refused(lambda: lm.Motor(**{k: v for k, v in NEMA_17.items() if k != key}), match=f"lacks {key}, which its supply_voltage needs")

@@ -20,7 +20,7 @@ from scipy import stats
 from typer.testing import CliRunner
 
 import lostmotion as lm
-from conftest import ROOT, forks, rows_by_any_threads_and_executor
+from conftest import ROOT, forks
 from html_pages import Page, charts
 from lostmotion.cli import app
 from lostmotion.errors import InputError
@@ -34,7 +34,7 @@ from lostmotion.studies.runs.runs_in_core import core_can
 from lostmotion.studies.study.random_designs import CHUNK
 from lostmotion.studies.study.study import Study
 from lostmotion.studies.study.vary import Vary
-from refusals import refuses
+from refusals import refused, refuses
 
 SHORT = paper_scenario("2-DOF-NL", "large").replace(**{"simulation.duration": 0.2, "simulation.sample_interval": 2e-3})
 
@@ -145,12 +145,6 @@ def test_a_torque_source_has_no_ideal_speed():
     scenario = SHORT.replace(**{"motor.kind": "torque_source"})
     with pytest.raises(ValueError, match="ideal_speed needs a motor of kind dc"):
         make(scenario=scenario, keep={"x": "peak(ideal_speed)"})
-
-
-def test_rows_do_not_depend_on_threads_or_executor(tmp_path: Path):
-    study = make(runs=2 * CHUNK + 24, design="random")
-    rows_by_any_threads_and_executor(study, tmp_path)
-    assert [p.name for p in sorted((tmp_path / "1").glob("*.parquet"))] == [f"part-00000{k}.parquet" for k in range(3)]
 
 
 def test_one_bad_run_is_recorded_and_stops_no_other(tmp_path: Path):
@@ -315,12 +309,10 @@ def test_a_full_disk_stops_it_with_one_line_and_loses_nothing(tmp_path: Path):
 
 def test_a_directory_of_another_study_is_left_alone(tmp_path: Path):
     lm.study(make(runs=4), tmp_path / "s")
-    with pytest.raises(InputError, match="holds another study"):
-        lm.study(make(runs=4, seed=9), tmp_path / "s")
+    assert "holds another study" in refused(lambda: lm.study(make(runs=4, seed=9), tmp_path / "s"))
     (tmp_path / "p").mkdir()
     (tmp_path / "p" / "mine.parquet").write_bytes(b"")
-    with pytest.raises(InputError, match="of no study"):
-        lm.study(make(runs=4), tmp_path / "p")
+    assert "of no study" in refused(lambda: lm.study(make(runs=4), tmp_path / "p"))
 
 
 SWAPPED = ("part-000000.parquet", "part-000001.parquet")
@@ -412,8 +404,7 @@ def test_what_is_no_file_is_named_and_not_read(tmp_path: Path, name: str, what: 
     else:
         path.symlink_to({"device": "/dev/zero", "link to nothing": "none", "link to itself": name}[what])
     begin = time.process_time()
-    with pytest.raises(InputError, match="holds no study" if name == "_study.json" else name):
-        read_table(directory)
+    refused(lambda: read_table(directory), match="holds no study" if name == "_study.json" else name)
     done = CliRunner().invoke(app, ["study", "resume", str(directory), "--repair"])
     assert time.process_time() - begin < 10.0
     if done.exit_code == 0:
@@ -441,10 +432,8 @@ def test_only_damaged_parts_are_made_again(tmp_path: Path):
 def test_a_part_that_no_run_of_the_study_is_in_is_refused(tmp_path: Path):
     directory = lm.study(make(runs=4), tmp_path / "s")
     (directory / "part-000007.parquet").write_bytes((directory / SWAPPED[0]).read_bytes())
-    with pytest.raises(InputError, match=r"part-000007\.parquet: is no part of this study; remove it"):
-        read_table(directory)
-    with pytest.raises(InputError, match="remove it"):
-        lm.study(make(runs=4), directory, repair=True)
+    assert "part-000007.parquet: is no part of this study; remove it" in refused(lambda: read_table(directory))
+    assert "remove it" in refused(lambda: lm.study(make(runs=4), directory, repair=True))
     assert (directory / "part-000007.parquet").exists()
 
 
@@ -513,7 +502,7 @@ def test_lost_workers_end_in_one_line_and_lose_no_part(tmp_path: Path, name: str
     killed = type("KilledWorker", (Exception,), {"__module__": "distributed.scheduler"})
     error = {"CancelledError": CancelledError, "BrokenProcessPool": BrokenProcessPool, "KilledWorker": killed}[name]()
     study = make(design="random", runs=2 * CHUNK + 1)
-    with pytest.raises(InputError, match=f"were lost .{name}.; what is written stays, and the same command resumes"):
+    with refuses(match=f"were lost .{name}.; what is written stays, and the same command resumes"):
         lm.study(study, tmp_path / "s", executor=Lost(error))
     assert read_table(lm.study(study, tmp_path / "s")).equals(read_table(lm.study(study, tmp_path / "t")))
 
@@ -720,9 +709,7 @@ def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, 
     path = tmp_path / "s.toml"
     assert old in GOOD
     path.write_text(GOOD.replace(old, new).replace("{base}", str(ROOT / "scenarios" / "paper-2dof-nl-large.toml")))
-    with pytest.raises(InputError, match=match) as caught:
-        lm.studies.load_study(path)
-    assert "\n" not in str(caught.value)
+    refused(lambda: lm.studies.load_study(path), match=match)
 
 
 def test_a_saved_result_can_be_the_base_of_a_study(tmp_path: Path):
@@ -741,8 +728,7 @@ def test_a_saved_result_is_refused_where_a_file_of_text_is_wanted(tmp_path: Path
     (tmp_path / "s.toml").write_text('base = "result.csv"\n')
     with refuses("base"):
         lm.load(tmp_path / "s.toml")
-    with pytest.raises(InputError, match=r"result.csv: has the ending of a saved result; a study is a TOML file"):
-        lm.studies.load_study(tmp_path / "result.csv")
+    assert "result.csv: has the ending of a saved result; a study is a" in refused(lambda: lm.studies.load_study(tmp_path / "result.csv"))
 
 
 def test_quantiles_are_those_of_the_statistics_library():

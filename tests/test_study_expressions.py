@@ -19,6 +19,7 @@ from lostmotion.simulation.variables import VARIABLES
 from lostmotion.studies.expressions.expressions import OF_THE_RUN, read_expression
 from lostmotion.studies.expressions.functions import FUNCTIONS, METHODS
 from lostmotion.studies.expressions.vocabulary import vocabulary_of
+from refusals import refused
 
 VOCABULARY = vocabulary_of(lm.load("paper-2dof-nl-small"))
 
@@ -293,8 +294,7 @@ def test_a_study_file_with_such_an_expression_is_refused_as_a_whole(tmp_path: Pa
     study = f"""base = "{base}"\ndesign = "list"\n[[vary]]\nkey = "load.inertia"\nvalues = [1, 2]\n[keep]\n"""
     path = tmp_path / "s.toml"
     path.write_text(study + 'good = "peak(load_speed)"\nbad = "load_speed.to_netcdf(\'f\')"\n')
-    with pytest.raises(lm.InputError, match=r"s\.toml: .*keep\.bad: .*must not use \.to_netcdf; the methods are mean"):
-        lm.studies.load_study(path)
+    refused(lambda: lm.studies.load_study(path), match=r"s\.toml: .*keep\.bad: .*must not use \.to_netcdf; the methods are mean")
     assert os.listdir() == ["s.toml"]
     scenario = paper_scenario("2-DOF-NL", "large")
     with pytest.raises(ValueError, match="must not use"):

@@ -21,6 +21,7 @@ from lostmotion.studies.runs.chunk import scenario_of_run
 from lostmotion.studies.runs.read_table import read_table
 from lostmotion.studies.selection.ranking import NOT_RUN, RankedCandidate, candidates, pareto_front, prices
 from lostmotion.studies.study.select_table import Selection
+from refusals import refused
 
 EXAMPLE = ROOT / "examples" / "select-gearbox.toml"
 
@@ -181,16 +182,13 @@ def test_a_bad_selection_ends_in_one_clear_line(tmp_path: Path, select: str, mat
     text = EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}')
     path = tmp_path / "s.toml"
     path.write_text(text[: text.index("[select]")] + "[select]\n" + select)
-    with pytest.raises(lm.InputError, match=match) as caught:
-        lm.studies.load_study(path)
-    assert "\n" not in str(caught.value)
+    refused(lambda: lm.studies.load_study(path), match=match)
 
 
 def test_a_name_of_the_drive_check_s_columns_is_taken(tmp_path: Path):
     text = EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}').replace("travel", "why")
     (tmp_path / "s.toml").write_text(text)
-    with pytest.raises(lm.InputError, match="keeps 'why', a name that is taken"):
-        lm.studies.load_study(tmp_path / "s.toml")
+    assert "keeps 'why', a name that is taken" in refused(lambda: lm.studies.load_study(tmp_path / "s.toml"))
 
 
 def test_best_takes_a_direction(selection: tuple[lm.studies.Study, Path]):
@@ -205,10 +203,8 @@ def test_best_takes_a_direction(selection: tuple[lm.studies.Study, Path]):
         assert lines[0] == f"{title} energy [J]:"
         assert f"energy {first:.5g}" in lines[1]
         assert study.vary[0].names[int(lines[1].split()[1].rstrip(","))] in lines[1]  # names are shown too
-    with pytest.raises(lm.InputError, match="direction must be least or largest, as in energy:largest"):
-        best_lines(directory, "energy:most")
-    with pytest.raises(lm.InputError, match="no such column of numbers"):
-        best_lines(directory, "gearbox")
+    assert "direction must be least or largest, as in energy:largest" in refused(lambda: best_lines(directory, "energy:most"))
+    assert "no such column of numbers" in refused(lambda: best_lines(directory, "gearbox"))
 
 
 def test_the_points_of_the_pareto_front_are_numbered_within_the_axes_and_named_below(selection: tuple[lm.studies.Study, Path]):

@@ -21,6 +21,7 @@ from lostmotion.studies.runs.read_table import read_table, unit_of
 from lostmotion.studies.study.drive_check_columns import check_columns
 from lostmotion.studies.study.select_table import SHARES, USE
 from lostmotion.studies.study.study_files import from_json, to_json
+from refusals import refused
 
 BELT = lm.load("belt-before-gearbox").replace(**{"simulation.duration": 0.3, "simulation.sample_interval": 2e-3})
 RING = lm.load("two-motors-one-ring").replace(**{"simulation.duration": 0.3, "simulation.sample_interval": 2e-3})
@@ -121,9 +122,7 @@ def test_a_stored_study_of_an_axis_names_keys_as_its_file_does() -> None:
     study = lm.studies.Study(scenario=axis, vary=vary, keep={"peak": "peak(slide_speed)"})
     again = from_json(to_json(study))
     assert to_json(again) == to_json(study)
-    with pytest.raises(lm.InputError) as refused:
-        again.scenario_at(np.array([-1.0]))
-    assert refused.value.problems[0].keys == ("axis.slide.mass",)
+    refused(lambda: again.scenario_at(np.array([-1.0])), "axis.slide.mass")
 
 
 def test_a_study_of_a_train_is_text_and_back(tmp_path: Path):
@@ -238,11 +237,9 @@ def test_each_run_of_a_selection_goes_through_the_drive_check(tmp_path: Path):
     ],
 )
 def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, sentence: str):
-    with pytest.raises(lm.InputError) as caught:
-        read(tmp_path, f"[[vary]]\n{text}")
-    assert sentence in str(caught.value)
-    assert str(tmp_path / "s.toml") in str(caught.value)
-    assert "\n" not in str(caught.value)
+    message = refused(lambda: read(tmp_path, f"[[vary]]\n{text}"))
+    assert sentence in message
+    assert str(tmp_path / "s.toml") in message
 
 
 @pytest.mark.parametrize(
@@ -254,9 +251,9 @@ def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, sent
     ],
 )
 def test_what_a_train_does_not_have_cannot_be_kept(expression: str, sentence: str):
-    with pytest.raises(lm.InputError, match=r"keep\.x: ") as caught:
-        make(keep={"x": expression})
-    assert sentence in str(caught.value)
+    message = refused(lambda: make(keep={"x": expression}))
+    assert "keep.x: " in message
+    assert sentence in message
 
 
 def test_a_train_of_one_motor_has_an_ideal_speed_and_a_bandwidth(tmp_path: Path):

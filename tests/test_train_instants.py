@@ -13,6 +13,7 @@ import scipy.linalg
 
 import lostmotion as lm
 from conftest import CONTROLLED, SCENARIOS, TRAINS
+from refusals import refused
 
 WORM = lm.load("worm-lowering")
 RING = lm.load("two-motors-one-ring")
@@ -185,10 +186,7 @@ def test_what_does_not_go_together_is_said_in_one_line(call: Any, sentence: str)
     simulation = lm.Simulation(WORM)
     simulation.advance(1e-3, **HOLDING)
     before = simulation.state
-    with pytest.raises(lm.InputError) as error:
-        call(simulation)
-    assert sentence in str(error.value)
-    assert "\n" not in str(error.value)
+    assert sentence in refused(lambda: call(simulation))
     assert simulation.state == before
 
 

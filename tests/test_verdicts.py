@@ -16,7 +16,7 @@ from lostmotion.servo.margins import instability
 from lostmotion.simulation.runs.run import run
 
 SEEDS = range(20_260_101, 20_260_101 + some(4, 2))
-AXES = some(50, 15)  # of each seed
+AXES = some(50, 10)  # of each seed
 LONG, LONGEST = 60.0, 3000.0  # [s], of the runs that decide; slower axes are not checked
 
 
