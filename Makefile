@@ -36,9 +36,11 @@ demo: $(VENV)/tools
 demo-page: $(VENV)/tools
 	@! $(NODE) || $(MAKE) --no-print-directory page-drive page-report
 
-# After a change: what finds most faults. make test runs all; of two jobs one has the longest, the other all else beside it.
-check: lint test-core check-python
-test: test-python test-core lint test-sanitized test-page
+# After a change: what finds most faults. make test runs all. Of two jobs one has the longest, the other all else beside it.
+check:
+	@$(MAKE) --no-print-directory --jobs=2 check-python lint test-core
+test:
+	@$(MAKE) --no-print-directory --jobs=2 test-python test-core lint test-sanitized test-page
 
 .PHONY: test-python check-python
 test-python: c-library fmu-library page-where-node $(VENV)/examples
