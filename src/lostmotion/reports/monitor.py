@@ -15,9 +15,10 @@ from ..units.practical import printed
 from .looks import FAINT, PALETTE
 from .page import Prose, Report, Table
 from .pages import table_csv
-from .panels import Curve, Group, Mark, Panel
+from .panels import Curve, Group, Panel
 
 VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5.0}
+BEGIN: dict[str, Any] = VALUES | {"color": PALETTE["second"], "markersize": 9.0}
 INTERVAL: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.2, "alpha": 0.6}
 LIMIT: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.5}
 EVIDENCE: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.6}
@@ -58,7 +59,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
 
 
 BLANK = "A blank cell means that too few logs of the baseline determine the value, or that it has no unit."
-TRENDS = "Estimate of each log with its 95 % interval. Dashed: limits. The marked log is the one at which a change most likely began."
+TRENDS = "Estimate of each log with its 95 % interval. Dashed: limits. The large point is the log at which a change most likely began."
 EVIDENCES = (
     "Bayes factor of a change, averaged over its beginning, its size and its shape. An alarm is evidence above the line with two logs "
     "in a row; the line is the reciprocal of the permitted probability of a false alarm."
@@ -131,12 +132,11 @@ def _trend(result: MonitorResult, w: Watched) -> Panel:
     first, last = min(e.at for e in result.logs), max(e.at for e in result.logs)
     span = np.array([first, last]) + 0.02 * (last - first) * np.array([-1.0, 1.0])
     curves += [Curve(f"limit {x:g}", span, np.full(2, x), LIMIT) for x in _limits(result, w)]
-    marks: tuple[Mark, ...] = ()
     if w.begins is not None:
         k = w.logs.index(w.begins)
-        marks = (Mark(float(at[k]), float(y[k]), result.logs[w.begins].log, VALUES),)
+        curves.append(Curve(f"change since {result.logs[w.begins].log}", at[[k]], y[[k]], BEGIN))
     x_range = (float(span[0]), float(span[1])) if last > first else None
-    return Panel(w.name, place, label, tuple(curves), x_range=x_range, marks=marks)
+    return Panel(w.name, place, label, tuple(curves), x_range=x_range)
 
 
 def _evidence(result: MonitorResult, w: Watched) -> Panel:

@@ -16,9 +16,9 @@ from .packed import colour_name, dashes
 from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Panel
 from .thinning import simplified, thinned
 
-WIDTH, HEIGHT = 560.0, 240.0
+WIDTH, HEIGHT = 460.0, 220.0  # small enough for two in a row on paper
 NARROW = 380.0  # width of bars and histograms, about the width of a card in three columns and on a telephone
-LEFT, RIGHT, TOP, BOTTOM = 56.0, 12.0, 10.0, 36.0
+LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
 CONSTANT = 1e-9  # relative differences up to which are rounding
 NAMES = 8  # along an axis
@@ -209,7 +209,7 @@ def _edges(middles: np.ndarray) -> list[float]:
 
 def _svg(title: str, height: float, parts: Iterable[str], width: float = WIDTH) -> str:
     label = f' aria-label="{escape(title)}"' if title else ""
-    narrow = f' style="max-width: {1.4 * width:g}px"' if width < WIDTH else ""
+    narrow = f' style="max-width: {1.2 * width:g}px"' if width < WIDTH else ""
     return f'<svg role="img"{label}{narrow} viewBox="0 0 {width:g} {height:g}">{"".join(parts)}</svg>'
 
 
