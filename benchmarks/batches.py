@@ -12,11 +12,11 @@ import numpy as np
 from report import Report
 
 import lostmotion as lm
-from lostmotion.simulation.variables import STATES
+from lostmotion import _core
 
 STEP, COUNT, COMPARED = 1e-3, 4096, 256
 RATIO, ROTOR, STIFFNESS = 50.0, 1e-4, 1e4
-ANGLE, SPEED = STATES.index("load_angle"), STATES.index("load_speed")
+ANGLE, SPEED = (_core.states().index(name) for name in ("load_angle", "load_speed"))
 
 
 def parameters(count: int) -> dict[str, np.ndarray]:
