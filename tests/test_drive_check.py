@@ -421,7 +421,7 @@ def test_the_drive_check_finds_what_is_wrong():
     scenario = lm.load(ROOT / "scenarios" / "catalogue-robot-joint.toml")
     heavy = scenario.replace(**{"load.inertia": 60.0, "command.frequency": 3.0})
     doubtful = {f.what for f in check_drive(heavy) if f.verdict == "caution"}
-    assert {"inertia of load and gearbox / of the rotor", "resonance on the softest segment"} <= doubtful
+    assert {"inertia ratio", "resonance on the softest segment"} <= doubtful
     weak = scenario.replace(**{"command.amplitude": 0.004})
     (zone,) = [f for f in check_drive(weak) if f.what == "dead zone"]
     assert zone.verdict == "warning"

@@ -37,14 +37,14 @@ def inertia_ratio(
     far = ratio > largest
     beyond: Judgement = "warning" if stated else "caution"
     if largest == printed:
-        remark = f"above {largest:g}, the limit of the motor's manufacturer"
+        remark = f"at most {largest:g}, the limit of the motor's manufacturer"
     elif stated:
-        remark = f"above {largest:g} the load is hard to control from the motor"
+        remark = f"at most {largest:g}: a load beyond is hard to control from the motor"
     else:
-        remark = f"above {largest:g} a load is usually hard to control; {key}.limits.max_inertia_ratio states the motor's own limit"
+        remark = f"recommended at most {largest:g}: a load beyond is usually hard to control; {key}.limits.max_inertia_ratio states the motor's own limit"
     return Finding(
         "inertia_ratio",
-        "inertia of load and gearbox / of the rotor",
+        "inertia ratio",
         f"{ratio:.3g}",
         beyond if far else "ok",
         remark if far else "",
