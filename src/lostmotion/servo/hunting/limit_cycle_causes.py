@@ -6,6 +6,7 @@ import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
+from operator import attrgetter
 from typing import Any
 
 from ...inputs.part import Part
@@ -78,7 +79,7 @@ class LimitCycle:
         """Causes without which there is no limit cycle, or less than half of the amplitude."""
         if not self.whole.cycles:
             return []
-        size = (lambda r: r.amplitude) if self.whole.floats else (lambda r: r.motor_amplitude)
+        size = attrgetter("amplitude" if self.whole.floats else "motor_amplitude")
         return [name for name, rest in self.without.items() if size(rest) < PART * size(self.whole)]
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from ...errors import InputError
 from ...model.torsion import Rigid
@@ -24,10 +24,11 @@ def need_open_loop(scenario: Scenario, function: str) -> None:
 
 def need_no_impacts(scenario: Scenario | DriveTrain, function: str) -> None:
     """Refuses a train with rigid flanks or end stops that strike, for what takes motions without impacts."""
+    in_file: Callable[[str], str] = str
     if isinstance(scenario, Scenario):
         train, gears, in_file = scenario.train(), scenario.gears_by_key(), scenario.key_in_file
     else:
-        train, gears, in_file = scenario, {f"gears.{name}": gear for name, gear in scenario.gears.items()}, str
+        train, gears = scenario, {f"gears.{name}": gear for name, gear in scenario.gears.items()}
     for key, gear in gears.items():
         if isinstance(gear.stiffness, Rigid) and gear.stiffness.strikes:
             remedy = (
