@@ -407,3 +407,19 @@ def test_the_table_of_the_page_has_every_worm_gear_and_what_is_said_below_it():
     assert max(ratios["overruns"]) == 25.0
     assert min(ratios["locks"]) == 80.0
     assert "Up to a ratio of 25 or 15 the load drives the gear" in PAGE
+
+
+def test_a_motor_without_inertia_is_explained_and_checked() -> None:
+    """Beside no inertia the load has infinitely much, and nothing swings against it."""
+    motor = {"kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 1.0}
+    slide = {"mass": 10.0, "friction_force": 10.0}
+    axis = lm.Scenario(
+        axis={"motor": motor, "belt": {"travel_per_turn": 0.1}, "slide": slide},
+        command=0.5,
+        simulation={"duration": 0.1, "sample_interval": 0.01},
+    )
+    assert lm.sizing.self_locking(axis.train(), "belt", load_torque=1.0).inertia_ratio == math.inf
+    radius = 0.1 / (2.0 * math.pi)
+    assert f"above {10.0 * radius:.4g}" in str(lm.explain(axis, 0.05))
+    soft = axis.replace(**{"axis.belt.stiffness": 1e6, "axis.belt.damping": 1e3})
+    assert not [f for f in lm.check_drive(soft) if f.rule == "resonance" and f.use is not None]

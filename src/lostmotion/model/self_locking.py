@@ -263,7 +263,7 @@ def self_locking(
         lowering=lowering,
         rate=max((v.real for v in growing), default=0.0) if lowering == "chatters" else 0.0,
         undamped_rate=undamped,
-        inertia_ratio=J_2 / (J_1 * part.ratio**2),
+        inertia_ratio=J_2 / (J_1 * part.ratio**2) if J_1 > 0.0 else math.inf,
         least_torque=least,
         motor=motor,
         moves_slide=train.is_slide(part.output),

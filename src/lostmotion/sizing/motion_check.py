@@ -53,9 +53,12 @@ def inertia_ratio(
 
 
 def resonances(motor: Motor, g: Gearbox, load_inertia: float) -> list[tuple[str, float, float]]:
-    """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve."""
+    """(segment, resonance, anti-resonance) [Hz] of the softest and the stiffest segment of the torsion curve.
+
+    None where nothing before the gear has inertia.
+    """
     J_1 = g.ratio**2 * (motor.rotor_inertia + g.inertia)
-    slopes = [] if isinstance(g.stiffness, Rigid) else [k for k in g.stiffness.all_slopes() if k > 0.0]
+    slopes = [] if isinstance(g.stiffness, Rigid) or J_1 == 0.0 else [k for k in g.stiffness.all_slopes() if k > 0.0]
     pieces = {"softest": min(slopes, default=0.0), "stiffest": max(slopes, default=0.0)}
     return [
         (name, math.sqrt(k / J_1 + k / load_inertia) / (2.0 * math.pi), math.sqrt(k / load_inertia) / (2.0 * math.pi))

@@ -130,7 +130,7 @@ class MotorState:
                     if abs(command) > self.command_limit
                     else ""
                 )
-                turns.append(f"{way} with a constant command {beyond} {command:.4g}{limit}")
+                turns.append(f"{way} with a constant command {beyond} {command + 0.0:.4g}{limit}")
         return f"motor {self.name}: its {moves} {', '.join(turns)}"
 
 
