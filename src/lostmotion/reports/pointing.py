@@ -151,7 +151,6 @@ def robustness_panels(budget: PointingBudget) -> list[Panel]:
         "arcmin": ("wear", "added backlash [arcmin]", 0.0),
         "µm": ("wear", "added axial backlash [µm]", 0.0),
     }
-    unit = " or ".join(f"m{unit}" for unit in _units(budget, None))
     panels = []
     factor, unit = _unit(budget)
     for sign, (title, label, nominal) in kinds.items():
