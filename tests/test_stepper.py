@@ -419,6 +419,7 @@ def test_the_live_page_draws_the_electrical_angle() -> None:
     page = describe(lm.load("stepper-belt-axis"), "belt")
     assert [f["series"][0]["variable"] for f in page["figures"]] == ["motor_command", "motor_electrical_angle"]
     assert not [s for s in page["sliders"] if s["key"].startswith("command")]  # which would take the steps away
+    assert not page["open_loop"]  # a field that swings by a radian is no command to draw a response of
 
 
 def test_step_by_step_the_field_and_the_current_are_named() -> None:

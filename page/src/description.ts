@@ -12,7 +12,7 @@ export interface Description {
   gears: GearView[];
   motors: MotorView[];
   contacts: { label: string; variable: string; slide: boolean }[];
-  /** no controller turns its motors */
+  /** neither a controller nor the steps of a driver turn its motors, so that a response to its command is drawn */
   open_loop: boolean;
   /** margins of the loops of the controllers, with the values of the file */
   loops: LoopView[];

@@ -54,7 +54,11 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
         "version": __version__,
         "core": core,
         **drawn(scenario),
-        "open_loop": not (scenario.axes() or scenario.continuous()),
+        "open_loop": not (
+            scenario.axes()
+            or scenario.continuous()
+            or any(m.kind == "stepper" for m in scenario.train().motors.values())
+        ),
         "loops": [view for motor in scenario.axes() for view in loop_views(scenario, motor)],
         "figures": [
             *stepper_figures(scenario),
