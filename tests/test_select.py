@@ -13,7 +13,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, lostmotion
-from lostmotion.control.tuning import TwoInertias, suited
+from lostmotion.control.gain_rules import TwoInertias, suited
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.simulation.runs.run import run
 from lostmotion.sizing.axis_task.axis_task import repeated

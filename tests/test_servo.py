@@ -12,7 +12,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT, lostmotion
 from html_pages import charts
-from lostmotion.control.tuning import TwoInertias, identical_damping, identical_radius, identical_real_part, symmetrical_optimum
+from lostmotion.control.gain_rules import TwoInertias, identical_damping, identical_radius, identical_real_part, symmetrical_optimum
 from lostmotion.reports.servo import servo_report
 from lostmotion.servo.linear_regimes import Axis, axis_of, regimes
 from lostmotion.servo.linear_sampled_loop import LinearLoop

@@ -18,7 +18,7 @@ from ..simulation.scenario.units_of_keys import limit_in, unit_for
 from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
-from .loops import loop_views
+from .loop_margins import loop_views
 from .references import reference_sliders, reference_view
 from .scenario_drawing import axis_figures, drawn, stepper_figures
 

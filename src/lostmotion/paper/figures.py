@@ -14,7 +14,7 @@ from ..reports.pages import panels_csv, plain, table_csv
 from ..reports.panels import Chart, Curve, Ground, Panel, scientific
 from ..response.crossovers import THREE_DECIBELS
 from ..response.rigid import rigid_constants
-from .drive import AMPLITUDES, MODELS, paper_scenario
+from .published_drive import AMPLITUDES, MODELS, paper_scenario
 from .quoted_numbers import Facts
 from .runs import FREQUENCIES, Results, stuck_intervals
 from .schematics import drawings

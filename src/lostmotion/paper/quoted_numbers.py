@@ -10,7 +10,7 @@ import numpy as np
 from ..response.crossovers import three_decibels_down
 from ..response.rigid import rigid_constants
 from ..simulation.runs.results import energy_of
-from .drive import AMPLITUDES, MODELS, paper_scenario
+from .published_drive import AMPLITUDES, MODELS, paper_scenario
 from .runs import FREQUENCIES, Results, stuck_intervals
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ import re
 from ..reports.page import cards, document, verdict
 from ..reports.pages import render_page
 from ..reports.panels import Chart, scientific
-from .drive import AMPLITUDES, MODELS, Constant
 from .figures import FigureSpec, charts_of
+from .published_drive import AMPLITUDES, MODELS, Constant
 from .quoted_numbers import Facts
 from .runs import FREQUENCIES
 

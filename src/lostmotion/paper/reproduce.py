@@ -8,8 +8,8 @@ from pathlib import Path
 from ..reports.pages import table_csv, write_text
 from ..reports.pictures import save, side_by_side
 from . import runs
-from .drive import Constant, constants
 from .figures import FIGURES, FigureSpec, draw, figure_csv, figure_specs
+from .published_drive import Constant, constants
 from .quoted_numbers import facts
 from .report import render
 

@@ -14,7 +14,7 @@ from ..simulation.runs.run import simulate
 from ..simulation.runs.switchings import switchings_of
 from ..test_rig.torsion_loop import Loop
 from ..test_rig.virtual_rig import TestRig
-from .drive import AMPLITUDES, MODELS, paper_scenario
+from .published_drive import AMPLITUDES, MODELS, paper_scenario
 
 if TYPE_CHECKING:
     import xarray

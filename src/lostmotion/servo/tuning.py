@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..control.filters import LowPass
-from ..control.tuning import (
+from ..control.gain_rules import (
     SpeedGains,
     TwoInertias,
     identical_damping,

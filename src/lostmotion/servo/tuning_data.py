@@ -8,8 +8,8 @@ import numpy as np
 
 from ..control.controller import Controller
 from ..control.filters import discrete
+from ..control.gain_rules import TwoInertias
 from ..control.loops import Difference, FirstOrderCurrent, Observer, SampledCurrent
-from ..control.tuning import TwoInertias
 from ..errors import InputError
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox

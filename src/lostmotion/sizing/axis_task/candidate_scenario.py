@@ -9,9 +9,9 @@ import numpy as np
 
 from ...control.command import CommandSignal, Stepping
 from ...control.controller import AnyCurrent, Controller
+from ...control.gain_rules import TwoInertias, suited
 from ...control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
 from ...control.references import PositionReference
-from ...control.tuning import TwoInertias, suited
 from ...inputs.cached_values import kept
 from ...model.duty import Duty
 from ...model.gearbox import Gearbox
