@@ -86,7 +86,7 @@ def _findings(scenario: Scenario) -> list[Finding]:
     for name, screw in scenario.screws.items():
         findings += _named(name if several else "", _screw(scenario, name, screw, result))
     for name in train.motors:
-        judged, powers[scenario.key_in_file(scenario.motor_key(name))] = _motor(scenario, name, result)
+        judged, powers[scenario.motor_key(name)] = _motor(scenario, name, result)
         findings += _named(name if several else "", judged)
     findings += axis_rules(scenario, axis, result)
     findings += holdings(scenario, result)
@@ -113,13 +113,13 @@ def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
     torque, speed = result[train.variable(name, "torque")], result[train.variable(motor.shaft, "speed")]
     oriented = oriented_amplitudes(scenario, result, name)
     current = effective_current(motor, torque, speed, None if oriented is None else oriented[0])
-    where = scenario.key_in_file(scenario.motor_key(name))
+    where = scenario.motor_key(name)
     return amplifier_of_a_run(result.time, current, motor, scenario.task, where)
 
 
 def _gear(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     train = scenario.train()
-    gear, where = train.gears[name], scenario.key_in_file(scenario.gear_key(name))
+    gear, where = train.gears[name], scenario.gear_key(name)
     torque = train.variable(name, "output_torque")
     cycle = duty_cycle(
         result,
@@ -192,8 +192,7 @@ def _load_torques(scenario: Scenario, name: str, result: RunArrays) -> list[floa
 def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Finding], np.ndarray]:
     """Findings, and the power that it takes [W]."""
     train = scenario.train()
-    motor, key = train.motors[name], scenario.motor_key(name)
-    where = scenario.key_in_file(key)
+    motor, where = train.motors[name], scenario.motor_key(name)
     torque, speed = train.variable(name, "torque"), train.variable(motor.shaft, "speed")
     if motor.kind == "stepper":  # its current does not follow its torque
         judged = [

@@ -40,7 +40,7 @@ def _inertias(scenario: Scenario) -> Finding:
         return not_judged("inertia_ratio", "the motor has no rotor_inertia")
     of_shafts = (shaft.inertia * (turns(train, name, motor.shaft) or 0.0) ** 2 for name, shaft in train.shafts.items())
     of_gears = (gear.inertia * (turns(train, gear.input, motor.shaft) or 0.0) ** 2 for gear in train.gears.values())
-    key = scenario.key_in_file(scenario.motor_key(name))
+    key = scenario.motor_key(name)
     return inertia_ratio(motor, DIRECT, sum(of_shafts) + sum(of_gears), key=key)
 
 

@@ -28,7 +28,7 @@ COARSE = 2
 def stepper_rules(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
     """Findings of one stepper of a run."""
     train = scenario.train()
-    motor, where = train.motors[name], scenario.key_in_file(scenario.motor_key(name))
+    motor, where = train.motors[name], scenario.motor_key(name)
     torque, speed = (
         np.abs(result[key]) for key in (train.variable(name, "torque"), train.variable(motor.shaft, "speed"))
     )

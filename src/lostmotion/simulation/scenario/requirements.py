@@ -60,7 +60,7 @@ def need_ideal_current(scenario: Scenario, function: str) -> None:
     for name in wound(scenario):
         raise InputError(
             f"{function}: the torque of a winding is a product of current and angle, which only runs of the adaptive solver have; leave it out for an ideal current",
-            f"{scenario.key_in_file(scenario.motor_key(name))}.supply_voltage",
+            f"{scenario.motor_key(name)}.supply_voltage",
         )
 
 

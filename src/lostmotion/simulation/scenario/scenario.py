@@ -290,7 +290,7 @@ class Scenario:
 
     def with_gears(self, gears: Mapping[str, Gear]) -> Self:
         """The same scenario with other gears, by their keys."""
-        names = {self.gear_key(name): name for name in self.tables.gears}
+        names = {self.own_key(self.tables.key_of("gears", name)): name for name in self.tables.gears}
         return self._with({"gears": {**self.tables.gears, **{names[key]: gear for key, gear in gears.items()}}})
 
     def with_axes(self, axes: Mapping[str, Controller | ContinuousController]) -> Self:
@@ -322,16 +322,16 @@ class Scenario:
         return self.own_key(f"controllers.{motor}")
 
     def gears_by_key(self) -> dict[str, Gear]:
-        """The gears by the keys of their tables."""
-        return {self.gear_key(name): gear for name, gear in self.train().gears.items()}
+        """The gears by the keys that the tables that are kept have for them."""
+        return {self.own_key(self.tables.key_of("gears", name)): gear for name, gear in self.train().gears.items()}
 
     def gear_key(self, name: str) -> str:
-        """Key of the table of a gear."""
-        return self.own_key(self.tables.key_of("gears", name))
+        """Key of the table of a gear in its file."""
+        return self.key_in_file(self.tables.key_of("gears", name))
 
     def motor_key(self, name: str) -> str:
-        """Key of the table of a motor."""
-        return self.own_key(self.tables.key_of("motors", name))
+        """Key of the table of a motor in its file."""
+        return self.key_in_file(self.tables.key_of("motors", name))
 
     def record_keys(self) -> Iterator[str]:
         """Keys that take names of records, and the conditions of their use."""
