@@ -31,7 +31,8 @@ class OneAxis:
         ((name, motor),) = train.motors.items()
         if (tied := tied_together(train)) is not None:
             return tied
-        whole, shaft, rated = DIRECT, motor.shaft, motor.rated_torque
+        whole, shaft = DIRECT, motor.shaft
+        rated = motor.rated_torque if motor.holding_torque is None else motor.holding_torque
         left, inertia = dict(train.gears), train.shafts[shaft].inertia
         while following := [key for key, gear in left.items() if gear.input == shaft]:
             gear = left.pop(following[0])
