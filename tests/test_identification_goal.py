@@ -116,6 +116,24 @@ def test_the_rate_limit_of_a_firmware_is_found(tmp_path: Path) -> None:
     assert result.error()[1] < 1.1 * math.hypot(NOISE, 2.0 * math.pi / 4096 / math.sqrt(12.0))  # noise and quantisation
 
 
+def test_a_goal_that_is_recorded_each_tenth_of_a_second_is_limited_in_between(tmp_path: Path) -> None:
+    """The same rig, once with the ramp of the goal at 1 kHz, once with its step at 10 Hz, which a dead time puts between samples."""
+    rate, time = 4.0, np.arange(0.0, 2.0, 1e-3)
+    free = limited_task(tmp_path).model_dump()
+    free["inputs"]["servo_reference"] |= {"interpolation": "linear", "rate_limit": None}
+    del free["parameters"]["goal_rate"]
+    free["ladder"][0]["free"] = ["viscous_friction", "armature"]
+    plan, values = servo_plans(1)[0], TRUTH | {"dead_time": 0.045}
+    held = {n: Channel(np.full(len(time), c.values[0])) for n, c in plan.channels.items()}
+    ramp = held | {"goal_position": Channel(np.clip(rate * (time - 0.2), 0.0, 1.0))}
+    fine = virtual_log(Rig(Identification(**free), SERVO), replace(plan, time=time, channels=ramp), values)
+    slow = {n: Channel(c.values[::100]) for n, c in held.items()} | {"goal_position": Channel(step(time, 0.2)[::100])}
+    limited = replace(plan, time=time[::100], channels=slow)
+    log = virtual_log(Rig(limited_task(tmp_path), SERVO), limited, values | {"goal_rate": rate})
+    apart = log.channels["position"].values - fine.channels["position"].values[::100]
+    assert np.abs(apart).max() < 2.0 * 2.0 * math.pi / 4096  # steps of the encoder
+
+
 def test_a_limit_that_is_no_limit_is_refused(tmp_path: Path) -> None:
     data = limited_task(tmp_path).model_dump()
     data["inputs"]["servo_reference"]["rate_limit"] = "-goal_rate"

@@ -94,7 +94,9 @@ def prepared(
 def _in_si(task: Identification, log: Log, units: Mapping[str, str]) -> Log:
     """The log with its channels in SI; one whose unit is not known stays as it is, unless the task names it."""
     entries = [(f"inputs.{name}", i.channel, i.unit, units.get(name, "")) for name, i in task.inputs.items()]
-    entries += [(f"measured.{n}", m.channel, m.unit, units.get(m.variable, "")) for n, m in task.measured.items()]
+    for name, m in task.measured.items():  # with a scale, a channel without a unit may count anything
+        of_rig = "" if "scale" in m.model_fields_set else units.get(m.variable, "")
+        entries.append((f"measured.{name}", m.channel, m.unit, of_rig))
     known: dict[str, tuple[float, str]] = {}
     for where, channel, written, kind in entries:
         log.values(channel)  # refuses a name that is none

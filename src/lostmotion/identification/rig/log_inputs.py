@@ -123,8 +123,9 @@ class LogInputs:
             slope[:-1] = np.diff(v) / np.diff(t)
         if late:
             t, v, slope = np.append(0.0, t), np.append(v[0], v), np.append(0.0, slope)
-        else:
-            v = v.copy()
+        else:  # from the last point before, which is one of a finer grid where the course is shaped
+            last = max(0, int(np.searchsorted(t, 0.0, side="right")) - 1)
+            t, v, slope = t[last:], v[last:].copy(), slope[last:]
             v[0] -= slope[0] * t[0]
             t = np.append(0.0, t[1:])
         return np.column_stack([t, v, slope])
