@@ -471,6 +471,15 @@ def test_the_response_to_the_field_is_that_of_a_rotor_on_its_spring() -> None:
     assert np.abs(found.sel(output="motor_speed").values[0] / exact - 1.0).max() < 1e-5
 
 
+def test_a_stuck_shaft_is_explained_by_its_field_and_has_no_dead_zone_of_commands() -> None:
+    said = str(lm.explain(lm.load("stepper-belt-axis"), 0.3))
+    assert "its shaft follows its field, which is at 9.425 rad, in steps" in said
+    assert "statics" not in said
+    scenario = lm.load("stepper-belt-axis")
+    response = lm.frequency_response(scenario, [5.0, 10.0], 0.01)
+    assert "dead_zone_forward" not in lm.response.characteristics(response, scenario).attrs
+
+
 def test_a_loop_around_a_stepper_is_refused() -> None:
     tables = lm.load("speed-axis").written.model_dump(exclude_none=True)
     tables["motor"] = MOTOR

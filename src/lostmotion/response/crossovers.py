@@ -66,7 +66,8 @@ def characteristics(response: xarray.Dataset, drive: Drive | Scenario, output: s
     scenario = Scenario.of_any(drive)
     if not scenario.controllers and not scenario.given() and len(scenario.motors) == 1:
         forward, backward = smallest_commands(scenario)
-        dead_zone = {"dead_zone_forward": forward, "dead_zone_backward": backward}
+        if not (math.isnan(forward) or math.isnan(backward)):  # the command of a stepper is an angle
+            dead_zone = {"dead_zone_forward": forward, "dead_zone_backward": backward}
     return xr.Dataset(
         {
             "bandwidth": ("amplitude", bandwidth, {"units": "Hz", "long_name": "-3 dB against the lowest frequency"}),

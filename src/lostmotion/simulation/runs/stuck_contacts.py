@@ -112,8 +112,11 @@ class MotorState:
     command_backward: float  # below it, backward
     command_limit: float  # that the motor can follow
     slides: bool = False  # a linear motor: its torque is a force [N]
+    steps: bool = False  # a stepper: its command is the angle of its field [rad]
 
     def __str__(self) -> str:
+        if self.steps:
+            return f"motor {self.name}: its shaft follows its field, which is at {self.command:.4g} rad, in steps"
         ways = (("forward", "above", self.command_forward), ("backward", "below", self.command_backward))
         turns = []
         moves = "slide moves" if self.slides else "shaft turns"
@@ -292,7 +295,11 @@ def _explanation(
         limits = (motor.command_limit, None if motor.torque_limit is None else motor.torque_limit / motor.rated_torque)
         limit = min(limit for limit in (*limits, math.inf) if limit is not None)
         command, torque = named[train.variable(name, "command")], named[train.variable(name, "torque")]
-        given: dict[str, Any] = {"command_limit": limit, "slides": train.is_slide(motor.shaft)}
+        given: dict[str, Any] = {
+            "command_limit": limit,
+            "slides": train.is_slide(motor.shaft),
+            "steps": motor.kind == "stepper",
+        }
         turned.append(MotorState(**commands, **given, command=command, torque=torque))
     locking = tuple(_verdicts(train, named))
     return Explanation(time, named, tuple(states), tuple(turned), tuple(train.shafts), locking, slides)
