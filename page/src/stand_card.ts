@@ -77,7 +77,9 @@ export class StandCard {
       ...named.map((c) =>
         h("li", {}, ...bar(c), h("b", {}, c.name), `: ${contact(c, this.slides.has(c.name) ? SLIDING : TURNING)}`),
       ),
-      ...motors.map((m) => h("li", {}, motor(m, this.commandOf(m.name), motors.length > 1))),
+      ...motors
+        .filter((m) => this.commandOf(m.name) !== undefined || !Number.isNaN(m.forward)) // no stepper, which follows its field
+        .map((m) => h("li", {}, motor(m, this.commandOf(m.name), motors.length > 1))),
     );
   }
 }
