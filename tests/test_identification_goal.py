@@ -14,6 +14,7 @@ from identification_logs import NOISE, SERVO, TRUTH, servo_plans, servo_task
 from lostmotion.identification.identify import identify_logs
 from lostmotion.identification.preparation.prepare import prepared
 from lostmotion.identification.readers.log import Channel
+from lostmotion.identification.rig.rig_runs import run_log
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.rig.servo_goal_limits import shaped
 from lostmotion.identification.task.identification_file import Identification
@@ -125,13 +126,16 @@ def test_a_goal_that_is_recorded_each_tenth_of_a_second_is_limited_in_between(tm
     free["ladder"][0]["free"] = ["viscous_friction", "armature"]
     plan, values = servo_plans(1)[0], TRUTH | {"dead_time": 0.045}
     held = {n: Channel(np.full(len(time), c.values[0])) for n, c in plan.channels.items()}
+    held["torque_enable"] = Channel(np.where(time < 0.1, 0.0, 1.0))  # so that a run begins between two points of the course of the goal
     ramp = held | {"goal_position": Channel(np.clip(rate * (time - 0.2), 0.0, 1.0))}
     fine = virtual_log(Rig(Identification(**free), SERVO), replace(plan, time=time, channels=ramp), values)
     slow = {n: Channel(c.values[::100]) for n, c in held.items()} | {"goal_position": Channel(step(time, 0.2)[::100])}
     limited = replace(plan, time=time[::100], channels=slow)
-    log = virtual_log(Rig(limited_task(tmp_path), SERVO), limited, values | {"goal_rate": rate})
-    apart = log.channels["position"].values - fine.channels["position"].values[::100]
-    assert np.abs(apart).max() < 2.0 * 2.0 * math.pi / 4096  # steps of the encoder
+    rig, measured = Rig(limited_task(tmp_path), SERVO), fine.channels["position"].values[::100]
+    log = prepared(rig.task, replace(limited, channels=slow | {"position": Channel(measured)}), rig.units)
+    known = {n: p.start for n, p in rig.task.parameters.items()}
+    found = run_log(rig, log, known | values | {"goal_rate": rate}, 0)["position"]
+    assert np.abs(found - measured).max() < 2.0 * 2.0 * math.pi / 4096  # steps of the encoder
 
 
 def test_a_limit_that_is_no_limit_is_refused(tmp_path: Path) -> None:
