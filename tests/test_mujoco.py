@@ -334,6 +334,16 @@ def test_a_screw_axis_is_described_by_mass_and_forces_at_its_slide() -> None:
 def test_the_load_torque_of_a_scenario_is_not_dropped_from_a_reduction() -> None:
     joint = lm.load("catalogue-robot-joint")
     refused(lambda: lm.mujoco.reduce(joint.replace(**{"load.torque": 10.0}), 0.5, 1.0), "load.torque")
+    given = lm.mujoco.reduce(joint.replace(**{"load.torque": 10.0}), 0.5, 1.0, load_torque=0.0)
+    assert given == lm.mujoco.reduce(joint, 0.5, 1.0)
+
+
+def test_a_joint_that_its_friction_locks_is_not_reduced() -> None:
+    """The motion ends near where it begins, so that the end alone does not show that the joint stood still."""
+    refused(
+        lambda: lm.mujoco.reduce(lm.load("catalogue-robot-joint").replace(**{"load.friction_torque": 1e5}), 0.5, 1.0),
+        "does not follow the motion",
+    )
 
 
 def test_what_a_reduction_costs_is_stated() -> None:

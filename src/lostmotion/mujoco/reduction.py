@@ -67,7 +67,7 @@ class Reduction:
 
 @checked
 def reduce(
-    drive: Drive | DriveTrain | Scenario, amplitude: float, frequency: Frequency, load_torque: float = 0.0
+    drive: Drive | DriveTrain | Scenario, amplitude: float, frequency: Frequency, load_torque: float | None = None
 ) -> Reduction:
     """Describe a drive by armature, damping, friction loss and gear, best for one motion.
 
@@ -84,7 +84,7 @@ def reduce(
     frequency
         [Hz]
     load_torque
-        Constant torque [N·m] or force [N] against the joint, such as gravity. The efficiency of the gear acts on it.
+        Constant torque [N·m] or force [N] against the joint, such as gravity. The efficiency of the gear acts on it. Left out, zero.
 
     Returns
     -------
@@ -110,11 +110,12 @@ def reduce(
     train = scenario.tables.train()
     joint = output_of("joint", train)
     amplitude = argument("amplitude", amplitude, train.angle_unit(joint))
-    load_torque = argument("load_torque", load_torque, train.torque_unit(joint))
+    given = load_torque is not None
+    load_torque = argument("load_torque", 0.0 if load_torque is None else load_torque, train.torque_unit(joint))
     for name, value in (("amplitude", amplitude), ("frequency", frequency)):
         if not value > 0.0:
             raise InputError(f"{name}: {shown(value)} must be positive")
-    if load_torque == 0.0 and (loads := loads_of(scenario) + weights_of("joint", scenario)):
+    if not given and (loads := loads_of(scenario) + weights_of("joint", scenario)):
         raise InputError("is not taken over; give load_torque, or leave the key out", *loads)
     source = _torque_source(without_weight("joint", scenario, replace=True, weighs=True).tables.train())
     columns, target, ratio = _along_sines(source, amplitude, frequency, load_torque)
@@ -172,6 +173,7 @@ def _along_sines(
     friction += sum(abs(ratios[key]) * shaft.friction_torque for key, shaft in train.shafts.items())
     rows: list[tuple[float, float, float, float]] = []
     targets: list[float] = []
+    farthest = 0.0
     for k in range(4 * STEPS_PER_PERIOD):
         t = (k + 0.5) * step
         q = v = a = 0.0
@@ -190,9 +192,10 @@ def _along_sines(
             mean, acceleration = 0.5 * (speed + after), (after - speed) / step
             rows.append((torque, -acceleration, -mean, -float(np.sign(mean))))
             targets.append(inertia * acceleration + load_torque)
-    if abs(simulation[train.variable(joint, "angle")] - q) > 0.5 * amplitude:
+            farthest = max(farthest, abs(simulation[train.variable(joint, "angle")] - q))
+    if farthest > 0.5 * amplitude:
         raise InputError(
-            "the joint does not follow the motion; give a larger amplitude, or a load torque that it can move"
+            "the joint does not follow the motion; give a larger amplitude, a load torque that it can move, or less friction on it"
         )
     return np.array(rows), np.array(targets), ratio
 
