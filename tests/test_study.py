@@ -621,6 +621,12 @@ def test_sobol_indices_of_a_closed_form(tmp_path: Path):
     ranks = influence(table, study)["momentum"]
     assert ranks["command.mean"] > 0.8
     assert ranks["load.torque.mean"] < -0.2
+    assert "depends most on command.mean (total Sobol index 0.9" in (tmp_path / "page" / "study.html").read_text()
+
+    equal = [{"key": key, "uniform": [0.0, 1.0]} for key in ("command.mean", "load.torque.mean")]
+    lm.study(Study(scenario=drive, design="saltelli", runs=64, vary=equal, keep=study.keep), tmp_path / "equal")
+    write_study(tmp_path / "equal", tmp_path / "even")  # both have a half of the variance
+    assert "these runs do not decide which" in (tmp_path / "even" / "study.html").read_text()
 
 
 def test_show_and_best_from_the_command_line(tmp_path: Path):

@@ -237,7 +237,7 @@ def _study_page(study: Study, table: pa.Table, name: str) -> Report:
         tables["sobol.csv"] = table_csv(
             head, [[kept, p, *found] for kept, by in indices.items() for p, found in by.items()]
         )
-    main, verdict = distributions(table, study), _result(table, study, ranks)
+    main, verdict = distributions(table, study), _result(table, study, ranks, indices)
     if study.select is not None:  # its chart and its tables come before the spread of the values
         selected = show_selection(table, study)
         tables, verdict = tables | selected.tables, selected.verdict
@@ -256,10 +256,12 @@ def _with_main(parts: Sequence[Table | Group]) -> tuple[Group, Sequence[Table | 
     return (first, rest) if isinstance(first, Group) else (Group("none", "", "", ()), parts)
 
 
-def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -> Verdict | tuple[str, ...]:
+def _result(
+    table: pa.Table, study: Study, ranks: dict[str, dict[str, float]], indices: dict[str, Any]
+) -> Verdict | tuple[str, ...]:
     """The spread of the first values, and what they depend on most."""
     lines = []
-    for name in list(study.keep)[:2]:
+    for name in list(study.keep)[:4]:
         label, factor = shown_in(table, study, name)
         x = factor * _finite(table, name)
         if len(x) == 0:
@@ -268,8 +270,19 @@ def _result(table: pa.Table, study: Study, ranks: dict[str, dict[str, float]]) -
         low, high = np.quantile(x, [0.05, 0.95])
         most = max(ranks.get(name, {}).items(), key=lambda pair: abs(pair[1]), default=None)
         depends = f"; depends most on {most[0]} (rank correlation {most[1]:+.2f})" if most and most[1] else ""
+        depends = _largest_index(indices[name]) if name in indices else depends
         lines.append(f"{label}: mean {x.mean():.5g}, 90 % of the runs within {low:.5g} and {high:.5g}{depends}.")
     return f"{_counted(table, study)}.", *lines
+
+
+def _largest_index(indices: dict[str, Any]) -> str:
+    """The parameter with the largest total index, or the two whose intervals do not separate them."""
+    shown = [(p, total, margin) for p, (_, total, _, margin) in indices.items() if np.isfinite(total)]
+    first, *others = sorted(shown, key=lambda found: -found[1])[:2] or [("", 0.0, 0.0)]
+    if others and first[1] - others[0][1] <= np.hypot(first[2], others[0][2]):
+        names = " or ".join(f"{p} ({total:.2f} ± {margin:.2f})" for p, total, margin in (first, *others))
+        return f"; depends most on {names}, total Sobol indices; these runs do not decide which"
+    return f"; depends most on {first[0]} (total Sobol index {first[1]:.2f} ± {first[2]:.2f})" if first[0] else ""
 
 
 def summary(directory: Path) -> tuple[list[str], Verdict | None]:
