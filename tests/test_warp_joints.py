@@ -193,6 +193,7 @@ FREE = PENDULUM.format(step=0.002, gravity=0.0)
         (lambda: Robot(FREE, {"j": drive()}, stiffness=1.0, damping=-1.0), "damping.j"),
         (lambda: Robot(FREE, {"j": drive()}).joints.before({}), "commands"),
         (lambda: Robot(FREE, {"j": drive()}).joints.before(np.zeros((3, 1))), "commands"),
+        (lambda: Robot(FREE, {"j": drive()}).joints.before(wp.zeros((1, 1))), "array of Warp for each joint"),
         (lambda: Robot(FREE, {"j": drive()}).joints.before({"j": [0.1, 0.2, 0.3]}), "commands.j: .*one for each world"),
         (lambda: Robot(FREE, {"j": drive()}).joints.reset([True]), "which"),
         (lambda: Robot(FREE, {"j": drive()}).joints["load_angle"], "load_angle"),

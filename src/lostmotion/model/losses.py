@@ -70,7 +70,9 @@ class LossMap(Part):
                     f"has a hole: row {j} (load {self.loads[j]}) has {len(row)} values for {len(self.speeds)} speeds"
                 )
         if self.mirrored and self.loads[0] != 0.0:
-            raise ValueError(f"is mirrored, so its loads must begin at 0, not {self.loads[0]}")
+            raise ValueError(
+                f"is mirrored, so its loads must begin at 0, not {self.loads[0]}; for a map of both directions set mirrored = false"
+            )
         if not self.mirrored and not self.loads[0] < 0.0 < self.loads[-1]:
             raise ValueError(
                 "covers only one direction of power flow; add loads of the other sign or set mirrored = true"

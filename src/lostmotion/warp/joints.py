@@ -109,6 +109,10 @@ class Joints:
         if isinstance(commands, Mapping):
             given = dict(commands)
         else:
+            if isinstance(commands, self._wp.array):
+                raise InputError(
+                    "commands: is one array of Warp; give an array of Warp for each joint, by its name, or one array of NumPy"
+                )
             need_shape = self._worlds, len(self.names)
             if np.shape(commands) != need_shape:
                 raise InputError(f"commands: have the shape {np.shape(commands)} and need {need_shape}")

@@ -225,7 +225,7 @@ class Study(Part):
                 if owner not in owners and not names_a_record(self.tables, owner):
                     raise ValueError(
                         f"varies {key}, which belongs beside `{name_key(owner)}`, but the {owner} of the base scenario is written "
-                        "out; name a record there, or vary that too"
+                        "out; name a record there, or vary its own keys, such as losses.values with relative = true"
                     )
             check_key(scenario, key, relative=relative)
             if unit_in(type(scenario.written), key) != unit_of_key(key):
