@@ -342,7 +342,7 @@ def test_a_joint_that_its_friction_locks_is_not_reduced() -> None:
     """The motion ends near where it begins, so that the end alone does not show that the joint stood still."""
     refused(
         lambda: lm.mujoco.reduce(lm.load("catalogue-robot-joint").replace(**{"load.friction_torque": 1e5}), 0.5, 1.0),
-        "does not follow the motion",
+        match="does not follow the motion",
     )
 
 
