@@ -8,6 +8,7 @@ from dataclasses import dataclass, field
 from ..errors import InputError
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.scenario_files import scenario_text
+from ..units.practical import OF_ERRORS
 from ..verdict import Point, Verdict
 from .candidate_models import GAIN, RungResult
 from .fit.intervals import Interval
@@ -24,7 +25,6 @@ from .verdicts.identifiability import Undetermined
 from .verdicts.residual_tests import Misfit
 from .verdicts.shared_faults import KindError, SharedFault
 
-SHOWN = {"rad": ("deg", math.degrees(1.0)), "m": ("mm", 1e3)}  # units in which errors are printed, by SI unit
 HALF = 0.5  # of the standard deviation of what was measured: a model that leaves more does not describe the motion
 
 
@@ -102,7 +102,7 @@ class IdentificationResult:
         if channel is None and more:
             return "standard deviations", 1.0
         unit = self.unit(channel or first)
-        return SHOWN.get(unit, (unit, 1.0))
+        return OF_ERRORS.get(unit, (unit, 1.0))
 
     def errors_text(self, *, held_out: bool) -> str:
         """MAE and RMSE of each channel that has errors, with its unit."""

@@ -22,6 +22,7 @@ PRACTICAL = {
     "degC": ("°C", 1.0),
     "ohm": ("Ω", 1.0),
 }
+OF_ERRORS = {"rad": ("deg", math.degrees(1.0)), "m": ("mm", 1e3)}  # units of errors of measured channels
 MOST_DIGITS = 12  # of a printed number
 PRINTED = (("*", "·"), ("^2", "²"), ("^3", "³"))
 

@@ -15,6 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...errors import InputError
+from ...units.practical import OF_ERRORS
 from ..fit.least_squares import Fit, problem_of, search
 from ..preparation.screening import MOTION, frozen_stretches, wrapped_by
 from ..prepared_log import Prepared
@@ -52,7 +53,7 @@ class OddLog:
     --------
     >>> from lostmotion.identification.verdicts.disagreeing_logs import OddLog
     >>> print(OddLog("7.csv", "angle", "rad", 0.5, 250.0, "angle has the opposite sign", 0.002, held_out=False).text)
-    7.csv: angle: residuals of 0.5 rad are 250 times those of the other logs; angle has the opposite sign: with that undone 0.002 rad
+    7.csv: angle: residuals of 28.6 deg are 250 times those of the other logs; angle has the opposite sign: with that undone 0.115 deg
     """
 
     log: str  # name of the log
@@ -73,10 +74,11 @@ class OddLog:
     @property
     def text(self) -> str:
         """One sentence: how far the log is off, and why."""
-        unit = f" {self.unit}".rstrip()
-        size = f"residuals of {self.rms:.3g}{unit}" if math.isfinite(self.rms) else "no run"
+        name, factor = OF_ERRORS.get(self.unit, (self.unit, 1.0))
+        unit = f" {name}".rstrip()
+        size = f"residuals of {factor * self.rms:.3g}{unit}" if math.isfinite(self.rms) else "no run"
         many = f" are {self.ratio:.3g} times those of the other logs" if math.isfinite(self.ratio) else ""
-        why = f"{self.fault}: with that undone {self.mended:.3g}{unit}" if self.fault else UNEXPLAINED
+        why = f"{self.fault}: with that undone {factor * self.mended:.3g}{unit}" if self.fault else UNEXPLAINED
         return f"{self.log}: {self.channel}: {size}{many}; {why}"
 
 
