@@ -79,3 +79,8 @@ def test_the_margins_hold_in_the_position_loop_too_where_its_encoder_sees_the_re
     rows = [row.margins for row in lm.commission(tuned.scenario).loops if row.loop == "position"]
     assert all(m.stable and not m.phase_margin < 1.047 and not m.gain_margin < 10.0**0.3 for m in rows)
     assert any(m.gain_margin < 10.0**0.35 for m in rows)  # and no more is given up than a tenth of the gain
+
+
+def test_a_gain_of_zero_is_refused_as_such_and_not_as_missing() -> None:
+    done = CliRunner().invoke(app, ["servo", "position-axis", "--set", "controller.speed.gain=0"])
+    assert "controller.speed.gain: 0.0 must be greater than 0" in str(done.exception)

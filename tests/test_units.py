@@ -19,6 +19,7 @@ from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 from lostmotion.simulation.scenario.units_of_keys import unit_of_key
 from lostmotion.units.conversion import si_factor, to_si
 from lostmotion.units.grammar import PREFIXED, angle_of, plain, read_unit, symbols, written
+from lostmotion.units.practical import practical
 from lostmotion.units.unit_table import PREFIXES, UNITS, dimension_of, factor_of
 
 RPM = 2.0 * math.pi / 60.0
@@ -454,3 +455,8 @@ def test_scenarios_studies_sheets_overrides_and_constructors_read_alike(tmp_path
         lm.Gearbox(**(gearbox.model_dump() | {"rated_input_speed": text})).rated_input_speed,
     ):
         assert found == pytest.approx(value, rel=1e-14)
+
+
+@pytest.mark.parametrize(("radians", "digits", "text"), [(0.0755, 2, "260 arcmin"), (12.555, 4, "43160 arcmin"), (1e-3, 2, "3.4 arcmin")])
+def test_values_in_practical_units_have_no_exponent_below_a_million(radians: float, digits: int, text: str) -> None:
+    assert practical(radians, "rad", digits) == text

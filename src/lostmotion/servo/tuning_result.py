@@ -148,7 +148,7 @@ def load_untuned(source: str | Path, overrides: Iterable[str], missing: list[str
 
 def missing_gains(error: InputError) -> list[str]:
     """Keys of the gains that a file lacks, also with the table of their loop."""
-    keys = [key for problem in error.problems for key in problem.keys if key.endswith(GAINS)]
+    keys = [key for p in error.problems if "missing" in p.reason for key in p.keys if key.endswith(GAINS)]
     loops = [(key, loop) for p in error.problems for key in p.keys for loop in GAINS if _lacks(p.reason, loop)]
     return keys + [f"{key}{loop}" for key, loop in loops]
 

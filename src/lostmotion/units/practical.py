@@ -95,5 +95,11 @@ def practical(value: Any, unit: str, digits: int = 5) -> str:
     values = value if isinstance(value, tuple) else (value,)
     if unit == "m" and any(values) and all(abs(v) < SMALL for v in values):
         name, factor = CHARTED_SMALL["m"]
-    text = ", ".join(f"{factor * v:.{digits}g}" for v in values)
+    text = ", ".join(_in_digits(factor * v, digits) for v in values)
     return f"{text} {name}".strip()
+
+
+def _in_digits(value: float, digits: int) -> str:
+    """So many digits, without an exponent below a million."""
+    text = f"{value:.{digits}g}"
+    return f"{float(text):.0f}" if "e+" in text and abs(value) < 1e6 else text
