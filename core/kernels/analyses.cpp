@@ -26,12 +26,16 @@ class AnalysesIn final : public Analyses {
     }
 };
 
-LOSTMOTION_SOLVING(extern template, model::Least)
 LOSTMOTION_SOLVING(extern template, Any)
 namespace {
-const AdaptiveKernelIn<model::Least> adaptive_of_drives("drive");
 const AdaptiveKernelIn<Any> adaptive("any");
-const AnalysesIn<model::Least> analyses_of_drives("drive");
 const AnalysesIn<Any> analyses("any");
 }  // namespace
+#ifndef LOSTMOTION_ANY_SIZE_ALONE
+LOSTMOTION_SOLVING(extern template, model::Least)
+namespace {
+const AdaptiveKernelIn<model::Least> adaptive_of_drives("drive");
+const AnalysesIn<model::Least> analyses_of_drives("drive");
+}  // namespace
+#endif
 }  // namespace lostmotion
