@@ -54,6 +54,17 @@ def small() -> Path:
     return ROOT / "scenarios" / "paper-2dof-nl-small.toml"
 
 
+@pytest.fixture(scope="module")
+def fast_compiles() -> Iterator[None]:
+    """Kernels of Warp with little optimisation."""
+    import warp as wp
+
+    level = wp.config.optimization_level
+    wp.config.optimization_level = 1
+    yield
+    wp.config.optimization_level = level
+
+
 def jamming() -> lm.Scenario:
     """A rigid self-locking worm under a heavy load, which jams: its effective inertia is below zero."""
     return lm.Scenario(

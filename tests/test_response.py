@@ -398,8 +398,7 @@ def test_bandwidth_is_where_the_gain_has_fallen_by_three_decibels():
     assert math.isnan(lm.response.bandwidth(linear, 0.5, highest=1.0))
     with pytest.raises(RuntimeError, match="does not move"):
         lm.response.bandwidth(NONLINEAR, 1e-3)
-    with pytest.raises(ValueError, match="must be positive"):
-        lm.response.bandwidth(linear, 0.0)
+    assert "must be positive" in refused(lambda: lm.response.bandwidth(linear, 0.0))
 
 
 def test_control_gets_the_response_as_data():

@@ -121,8 +121,7 @@ def test_a_csv_file_without_the_number_of_its_samples_is_refused(result: xr.Data
 
 
 def test_what_is_no_result_has_no_switchings() -> None:
-    with pytest.raises(ValueError, match="has no switchings; give a result of simulate"):
-        lm.switchings_of(xr.Dataset())
+    assert "has no switchings; give a result of simulate" in refused(lambda: lm.switchings_of(xr.Dataset()))
 
 
 def test_energy_balance_closes_to_rounding(result: xr.Dataset) -> None:

@@ -218,8 +218,7 @@ def test_misspelt_arguments_fail(small: Path) -> None:
         lm.simulate(scenario, comand=0.1)  # type: ignore[call-arg]
     with pytest.raises(ValueError, match="euler"):
         lm.simulate(scenario, solver="euler")  # type: ignore[arg-type]
-    with pytest.raises(ValueError, match="duration"):
-        lm.simulate(scenario.drive(), command=0.1)
+    assert "duration" in refused(lambda: lm.simulate(scenario.drive(), command=0.1))
 
 
 def test_end_state_continues_a_run(small: Path) -> None:

@@ -9,6 +9,7 @@ import lostmotion as lm
 from refusals import refused
 
 wp = pytest.importorskip("warp")
+pytestmark = pytest.mark.usefixtures("fast_compiles")
 
 COUNT = 64
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from refusals import refused
 wp = pytest.importorskip("warp")
 mjw = pytest.importorskip("mujoco_warp")
 mujoco = pytest.importorskip("mujoco")
+pytestmark = pytest.mark.usefixtures("fast_compiles")
 
 PENDULUM = """<mujoco><option timestep="{step}" gravity="0 0 {gravity}"/><worldbody><body>
 <joint name="j" axis="0 1 0"/><inertial pos=".2 0 0" mass="1" diaginertia=".001 .96 .96"/></body></worldbody></mujoco>"""
@@ -28,14 +29,6 @@ LEG = """<mujoco><option timestep="{step}"/><worldbody><geom type="plane" size="
 <body pos=".15 0 -.2"><joint name="knee" axis="0 1 0"/><geom type="capsule" fromto="0 0 0 -.15 0 -.2" size=".02" mass=".3"/>
 </body></body></body></worldbody></mujoco>"""
 WORLDS = 4
-
-
-@pytest.fixture(autouse=True, scope="module")
-def fast_compiles() -> Iterator[None]:
-    level = wp.config.optimization_level
-    wp.config.optimization_level = 1
-    yield
-    wp.config.optimization_level = level
 
 
 def drive(ratio: float = 50.0, *, gap: float = 2e-3, friction: float = 0.02, **parts: Any) -> lm.Drive:
