@@ -356,6 +356,18 @@ def test_a_changed_axis_speaks_of_the_keys_of_its_file() -> None:
     refused(lambda: changed.replace(**{"slides.slide.mass": -1.0}), "axis.slide.mass")
 
 
+def test_a_result_of_an_axis_has_the_tables_of_its_file(tmp_path: Path) -> None:
+    axis = lm.Scenario(**axis_table(random.Random(3))).replace(**{"simulation.duration": 0.01})
+    lm.save(lm.simulate(axis), tmp_path / "run.nc")
+    again = lm.simulation.scenario_of(lm.open_result(tmp_path / "run.nc"))
+    assert again == axis
+    assert again.form == axis.form
+    with pytest.raises(lm.InputError, match=r"axis\.motor\.limits\.torque_constant"):
+        lm.sizing.motor_current(lm.open_result(tmp_path / "run.nc"))
+    more = axis.replace(**{"shafts.motor.inertia": 1e-4})  # which a file of an axis cannot say
+    assert lm.Scenario.from_json(more.to_json()).tables == more.tables
+
+
 def test_the_one_command_and_the_one_load_are_given_alike_in_each_form() -> None:
     scenario = lm.load("catalogue-robot-joint")
     wave = lm.CommandSignal(amplitude=0.2, frequency=2.0)

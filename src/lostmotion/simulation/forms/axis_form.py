@@ -13,7 +13,7 @@ from ...units.conversion import Unit
 from .common_tables import RECORD_NAME
 from .drive_tables import drive_schema
 from .key_aliases import BRAKE, DRIVES, GEARBOX, MOTOR, SLIDE
-from .train_tables import train_schema
+from .train_tables import ShaftTable, train_schema
 
 PAYLOAD = "payload"
 BESIDE = ("title", "task", "command", "controller", "initial", "simulation")
@@ -48,6 +48,31 @@ def long_form(tables: Mapping[str, Any]) -> dict[str, Any]:
             long["command"] = {**long.get("command", {}), BRAKE: table[BRAKE].pop("command")}
         long["brakes"] = {BRAKE: {"shaft": MOTOR, **table[BRAKE]}}
     return {**{key: tables[key] for key in ("title", "task", "initial", "simulation") if key in tables}, **long}
+
+
+def short_form(long: Mapping[str, Any]) -> dict[str, Any]:
+    """The written-out tables of an axis in the long form as its files have them; as they are if they have more than an axis."""
+    kind = next(kind for kind, table in DRIVES.items() if long[table])
+    joined = {
+        MOTOR: ("motors", "shaft"),
+        GEARBOX: ("gears", "input", "output"),
+        kind: (DRIVES[kind], "input", "output"),
+        SLIDE: ("slides",),
+        BRAKE: ("brakes", "shaft"),
+    }
+    axis: dict[str, dict[str, Any]] = {}
+    for part, (table, *ends) in joined.items():
+        if part in long[table]:
+            axis[part] = {key: value for key, value in long[table][part].items() if key not in ends}
+    made = {"axis": axis, **{key: long[key] for key in ("title", "task", "initial", "simulation")}}
+    for table, key in (("controllers", "controller"), ("command", "command")):
+        if MOTOR in long[table]:
+            made[key] = long[table][MOTOR]
+    if BRAKE in long["command"]:
+        axis[BRAKE]["command"] = long["command"][BRAKE]
+    known = {*made, "shafts", "controllers", "command", *(table for table, *_ in joined.values())}
+    plain = all(shaft == ShaftTable().model_dump(exclude_none=True) for shaft in long["shafts"].values())
+    return made if plain and not any(long[table] for table in long.keys() - known) else dict(long)
 
 
 def _kind_of(tables: Mapping[str, Any]) -> str:

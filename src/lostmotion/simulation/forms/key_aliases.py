@@ -43,7 +43,6 @@ _AXIS = {
 class Form:
     """A form of files."""
 
-    name: str
     keys: tuple[tuple[str, str], ...]  # keys of the long form, and what they are called
     back: tuple[tuple[str, str], ...]
     """keys of derived data, and of the tables that a scenario is read from again"""
@@ -74,10 +73,9 @@ def _first_of(keys: Iterable[tuple[str, str]]) -> dict[str, str]:
     return first
 
 
-TRAIN = Form("train", (), ())
-DRIVE = Form("drive", tuple(_DRIVE.items()), tuple(_DRIVE.items()))
-AXIS = Form("axis", tuple(_AXIS.items()), tuple(_axis_back()))
-FORMS = {form.name: form for form in (TRAIN, DRIVE, AXIS)}
+TRAIN = Form((), ())
+DRIVE = Form(tuple(_DRIVE.items()), tuple(_DRIVE.items()))
+AXIS = Form(tuple(_AXIS.items()), tuple(_axis_back()))
 
 
 def in_file(key: str, tables: Mapping[str, Any]) -> str:

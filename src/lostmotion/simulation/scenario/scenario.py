@@ -244,7 +244,9 @@ class Scenario:
         """Values of parts are scenarios or their tables."""
 
         def written(scenario: Scenario, info: core_schema.SerializationInfo) -> dict[str, Any]:
-            return scenario.written.model_dump(mode=info.mode, exclude_none=info.exclude_none)
+            if info.mode == "json":
+                return json.loads(scenario.to_json())  # type: ignore[no-any-return]
+            return scenario.written.model_dump(exclude_none=info.exclude_none)
 
         return core_schema.no_info_plain_validator_function(
             cls.model_validate,
@@ -259,6 +261,8 @@ class Scenario:
     @kept
     def to_json(self) -> str:
         """All values in SI, as JSON that `from_json` reads."""
+        if self.form == AXIS:
+            return json.dumps(axis_form.short_form(self.tables.model_dump(mode="json", exclude_none=True)))
         return self.written.model_dump_json(exclude_none=True)
 
     def model_copy(self, *, update: Mapping[str, Any] | None = None, deep: bool = False) -> Self:

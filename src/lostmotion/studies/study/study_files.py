@@ -10,10 +10,8 @@ from ...errors import InputError, prefixed
 from ...inputs.arguments import checked
 from ...inputs.toml_files import read_toml
 from ...simulation.forms.axis_form import long_form
-from ...simulation.forms.key_aliases import FORMS
 from ...simulation.runs.loading import load
 from ...simulation.runs.result_files import FORMATS
-from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_base, read_tables
 from .records_that_vary import kind_of_record, names_of
 from .study import Study
@@ -82,13 +80,9 @@ def find_sheets(entry: Any, directory: Path) -> None:
 
 def from_json(text: str) -> Study:
     """The study that `to_json` wrote."""
-    data = json.loads(text)
-    scenario = Scenario(**data["scenario"])
-    form = FORMS.get(data.pop("form", ""), scenario.form)
-    return Study(**data | {"scenario": Scenario.of(scenario.tables, form, checked=False)})
+    return Study(**json.loads(text))
 
 
 def to_json(study: Study) -> str:
     """The study as JSON, with its base scenario."""
-    text = study.model_dump_json(exclude_none=True)
-    return f'{text.removesuffix("}")},"form":"{study.scenario.form.name}"}}'
+    return study.model_dump_json(exclude_none=True)
