@@ -78,6 +78,80 @@ def test_a_torque_that_turns_back_within_the_rounding_of_the_state_ends_its_regi
         assert exact[name].values == pytest.approx(expected, rel=1e-6, abs=1e-7 * float(abs(expected).max() + 1e-9))
 
 
+def two_shafts_at_their_limits() -> lm.Scenario:
+    """Behind two clutches on a shaft that a brake holds, two shafts come to the limits of their friction, one beside a torque of 600 N·m
+    at the edge of a backlash."""
+    return lm.Scenario(
+        shafts={
+            "s0": {"inertia": 0.8845454326082097},
+            "s1": {"inertia": 0.0017414033422975003},
+            "s2": {"inertia": 0.009987781234138227, "friction_torque": 0.005660826554047997, "viscous_friction": 0.0001450462366078829},
+            "s3": {"inertia": 0.3585288458220457, "friction_torque": 0.020276980299298555},
+        },
+        motors={
+            "m0": {
+                "shaft": "s2",
+                "kind": "dc",
+                "rotor_inertia": 0.019782303163847964,
+                "rated_torque": 0.21280182267098696,
+                "rated_speed": 284.0122006182779,
+                "armature_voltage_constant": 12.6,
+                "electrical_time_constant": 0.0002811748193650458,
+            }
+        },
+        command={
+            "x2": 0.7,
+            "b": 0.5,
+            "m0": {
+                "mean": 0.43082696518702446,
+                "amplitude": 0.4505326361981701,
+                "frequency": 8.655970457941477,
+                "phase": -0.6898421198385254,
+            },
+        },
+        gears={
+            "x1": {
+                "input": "s0",
+                "output": "s1",
+                "ratio": 8.072003981777065,
+                "mesh_damping": 0.27580166128814276,
+                "damping_limited": True,
+                "stiffness": {"kind": "curve", "backlash": 0.008992098938129366, "slopes": [139325.03751347077]},
+                "losses": {"kind": "constant_efficiency", "efficiency": 0.6266484683685396},
+            },
+            "closing": {
+                "input": "s0",
+                "output": "s3",
+                "ratio": 2.3867100993418626,
+                "stiffness": {"kind": "linear", "stiffness": 576864.6066618726},
+                "losses": {"kind": "constant_efficiency", "efficiency": 0.5068261413307877},
+            },
+        },
+        clutches={
+            "x2": {"input": "s1", "output": "s2", "torque": 2.2120610224504884, "kind": "friction"},
+            "x3": {"input": "s1", "output": "s3", "torque": 0.43279117781608384, "kind": "safety"},
+        },
+        brakes={"b": {"shaft": "s1", "torque": 2.0694700035197005}},
+        springs={"k": {"shaft": "s3", "stiffness": {"kind": "linear", "stiffness": 50.607799342222435}}},
+        angle_torques={
+            "c": {"shaft": "s3", "kind": "sine", "amplitude": 0.05839213500333903, "order": 1, "phase": 0.5078347527358091, "error": 1e-8}
+        },
+        simulation={"duration": 0.3, "sample_interval": 3e-3},
+    )
+
+
+def test_two_shafts_that_come_to_their_limits_one_after_the_other_stay_there_both() -> None:
+    """Each seems to have a margin of 1e-12 N·m as the other one comes to its limit, which an elimination leaves of 600 N·m."""
+    with interrupted_after(20.0):
+        exact = lm.simulate(two_shafts_at_their_limits())
+    assert exact.attrs["switching_count"] < 300
+    adaptive = lm.simulate(two_shafts_at_their_limits(), solver="dormand-prince", relative_tolerance=1e-11)
+    for name in ("s0_speed", "s1_speed", "s2_speed", "s3_speed", "x1_twist", "closing_twist"):
+        assert float(np.abs(exact[name] - adaptive[name]).max()) < 1e-6 * float(np.abs(exact[name]).max()), name
+    energy = lm.energy_of(exact)
+    assert abs(energy["residual"]) < 1e-11 * energy["turned_over"]
+
+
 def test_a_turn_is_not_looked_for_beyond_the_end_of_a_motion_that_grows() -> None:
     """Friction that falls makes a tiny inertia faster until a guard ends that; 1 ms on, its speed would be beyond all numbers.
 

@@ -351,9 +351,10 @@ const SwitchedTrain::Guard* SwitchedTrain::first_left(const SparseRegime& r, con
             const Guard& guard = r.guards[g];
             if (guard.behind || is_of_moving(guard, event)) continue;
             if (!ignored.empty() && std::ranges::find(ignored, g) != ignored.end()) continue;
-            const auto [value, of_terms] = sized(guard.form, now);
+            auto [value, of_terms] = sized(guard.form, now);
             const double size = guard.shift == 0.0 ? of_terms : size_at_turn(guard, now);
             if (value > clear_of_zero * size + r.near_event[g]) continue;
+            if (std::fabs(value) <= clear_of_zero * r.near_event[g] && event.was_at_limit(guard)) value = 0.0;
             if (!use(guard, value, size)) return;
         }
     };

@@ -109,6 +109,12 @@ class SwitchedTrain {
             return (by_value && g.kind != Guard::set_off) ||
                    (with_guard && kind == Guard::speed && g.kind == Guard::capacity && g.contact == contact);
         }
+        // A contact that has been at its limit up to the end of a regime has no margin there: a value is what an
+        // elimination has left of larger terms. Contacts that stop may take its torque with a jump.
+        bool was_at_limit(const Guard& g) const {
+            return with_guard && kind != Guard::speed && g.kind == Guard::capacity && g.contact != contact &&
+                   before.modes[g.contact] == g.neighbour && at_rest[g.contact];
+        }
         // The solver has seen this regime to its end.
         bool has_ended(const Key& key) const { return with_guard && kind != Guard::speed && key == before; }
     };
