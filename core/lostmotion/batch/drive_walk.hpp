@@ -195,7 +195,7 @@ struct DriveWalk {
     bool bold;
     mutable int doubts;
     real y[4][longest_series + 1];  // terms of the series of q, a, v, d, in the share of its time
-    real tail[4], slope_tail[4];    // of the terms beyond the cubic, and of its slope
+    real tail[4];                   // of the terms beyond the cubic
 
     // False: there is a doubt that the walk does not go on with.
     bool goes_on_with(int doubt) const {
@@ -661,22 +661,29 @@ struct DriveWalk {
         y[1][1] = a;
         y[2][1] = v;
         y[3][1] = d;
-        for (int c = 0; c < 4; ++c) tail[c] = slope_tail[c] = 0;
-        const real twists = r.twists ? 1 : 0;
+        for (int c = 0; c < 4; ++c) tail[c] = 0;
         const auto size = [&] {
             return most(most(magnitude(q) * r.per_q, magnitude(d) * r.per_d), most(magnitude(a), magnitude(v)));
         };
         const real enough = real(0.0625) * ROUNDING * size();
+        // The k-th derivative times s^k, and 1/k!: a chain of products of the matrix alone is the shortest.
+        const real qq = s * r.q.q, qa = s * r.q.a, aq = s * r.a.q, aa = s * r.a.a, av = s * r.a.v, ad = s * r.a.d,
+                   vq = s * r.v.q, va = s * r.v.a, vv = s * r.v.v, vd = s * r.v.d, dv = r.twists ? s : 0;
+        real share = 1, by_q = q, by_a = a, by_v = v, by_d = d;
         int k = 2;
         for (; k <= longest; ++k) {
-            const real f = s * laws.inverse[k];
-            const real next_q = f * (r.q.q * q + r.q.a * a);
-            const real next_a = f * ((r.a.q * q + r.a.a * a) + (r.a.v * v + r.a.d * d));
-            const real next_v = f * ((r.v.q * q + r.v.a * a) + (r.v.v * v + r.v.d * d));
-            d = f * twists * v;
-            q = next_q;
-            a = next_a;
-            v = next_v;
+            const real next_q = qq * by_q + qa * by_a;
+            const real next_a = (aq * by_q + aa * by_a) + (av * by_v + ad * by_d);
+            const real next_v = (vq * by_q + va * by_a) + (vv * by_v + vd * by_d);
+            by_d = dv * by_v;
+            by_q = next_q;
+            by_a = next_a;
+            by_v = next_v;
+            share *= laws.inverse[k];
+            q = share * by_q;
+            a = share * by_a;
+            v = share * by_v;
+            d = share * by_d;
             y[0][k] = q;
             y[1][k] = a;
             y[2][k] = v;
@@ -686,10 +693,6 @@ struct DriveWalk {
                 tail[1] += magnitude(a);
                 tail[2] += magnitude(v);
                 tail[3] += magnitude(d);
-                slope_tail[0] += k * magnitude(q);
-                slope_tail[1] += k * magnitude(a);
-                slope_tail[2] += k * magnitude(v);
-                slope_tail[3] += k * magnitude(d);
                 // The terms beyond are bounded by this one and |A| s.
                 if ((k & 1) == 0 && reached * laws.inverse[k + 1] * size() <= enough) break;
             }
@@ -699,14 +702,11 @@ struct DriveWalk {
     // To half of its time.
     void shorten() {
         real share = 1;
-        for (int c = 0; c < 4; ++c) tail[c] = slope_tail[c] = 0;
+        for (int c = 0; c < 4; ++c) tail[c] = 0;
         for (int k = 0; k <= degree; ++k, share *= real(0.5))
             for (int c = 0; c < 4; ++c) {
                 y[c][k] *= share;
-                if (k > 3) {
-                    tail[c] += magnitude(y[c][k]);
-                    slope_tail[c] += k * magnitude(y[c][k]);
-                }
+                if (k > 3) tail[c] += magnitude(y[c][k]);
             }
     }
     // To the share `at` of the time of the series.
@@ -882,17 +882,18 @@ struct DriveWalk {
             halve = !(c[3] > rest);
             return yes;
         }
-        const real slope_rest = (magnitude(f.q) * slope_tail[0] + magnitude(f.a) * slope_tail[1]) +
-                                (magnitude(f.v) * slope_tail[2] + magnitude(f.d) * slope_tail[3]);
+        real all[longest_series + 1], end = 0, slope_rest = 0;
+        for (int k = degree; k >= 4; --k) {
+            end += all[k] = term(f, k);
+            slope_rest += k * magnitude(all[k]);
+        }
         const real d0 = c[1], d1 = c[1] + c[2], d2 = c[1] + 2 * c[2] + 3 * c[3];
         if (least(d0, least(d1, d2)) > slope_rest) return yes;
         if (!(most(d0, most(d1, d2)) < -slope_rest)) {
             halve = true;
             return yes;
         }
-        real all[longest_series + 1], end = 0;
         int n = degree;
-        for (int k = degree; k >= 4; --k) end += all[k] = term(f, k);
         for (int k = 0; k < 4; ++k) all[k] = c[k];
         end += c[3] + c[2] + c[1] + c[0];
         if (end >= 0) return yes;
