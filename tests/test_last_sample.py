@@ -118,3 +118,13 @@ def test_a_mean_over_samples_weighs_the_last_by_its_interval(tmp_path: Path, eng
     for name in keep:
         assert rows[0.2 * (1.0 + 1e-9)][name] == pytest.approx(rows[0.2][name], rel=1e-7)
         assert rows[0.205][name] != rows[0.2][name]
+
+
+@pytest.mark.parametrize(("interval", "said"), [(0.1, True), (1e-3, False)])
+def test_a_summary_says_that_its_peaks_are_those_of_few_samples(interval: float, said: bool) -> None:
+    """A command of 3 Hz every 0.1 s has 3.33 samples in a period."""
+    scenario = lm.load("paper-2dof-nl-large").replace(
+        command={"amplitude": 0.5, "frequency": 3.0}, simulation={"duration": 0.5, "sample_interval": interval}
+    )
+    text = summary(lm.simulate(scenario))
+    assert ("peaks are those of the samples, 3.33 in a period of 3 Hz" in text) == said

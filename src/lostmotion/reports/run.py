@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
 
 # Of more elements than `MANY`, a summary shows the elements that move, carry or lose most; the page has all.
 MANY, SHOWN = 12, 6
+FEWEST = 20.0  # samples in the period of a sine, with which a peak of it is missed by 1.2 % at most
 
 
 def summary(result: xarray.Dataset | RunArrays) -> str:
@@ -95,7 +97,15 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
         parts, others = _most(found)
         parts += [f"{counted(len(others), 'other')} of up to {max(others):.4g} each"] if others else []
         lines.append(f"  energy [J]: {', '.join(parts) or 'none'}")
-    return "\n".join([*lines, *_last_lines(result)])
+    return "\n".join([*lines, *_of_samples(scenario), *_last_lines(result)])
+
+
+def _of_samples(scenario: Scenario) -> Iterator[str]:
+    """A line where peaks may lie between the samples of a sine, whose largest one is then up to 1 % or more below its amplitude."""
+    fastest = max((f for s in scenario.signals().values() for _, f, _ in s.sine_list()), default=0.0)
+    period = math.inf if fastest == 0.0 else 1.0 / (fastest * scenario.simulation.sample_interval)
+    if period < FEWEST:
+        yield f"  peaks are those of the samples, {period:.3g} in a period of {fastest:g} Hz; a shorter sample_interval finds higher ones"
 
 
 def _last_lines(result: xarray.Dataset | RunArrays) -> Iterator[str]:
