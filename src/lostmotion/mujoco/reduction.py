@@ -51,15 +51,19 @@ class Reduction:
         """The joint and its motor as MJCF."""
         kind = ' type="slide"' if self.slides else ""
         return (
-            f'<joint name="{joint}"{kind} armature="{self.armature:.6g}" damping="{self.damping:.6g}" frictionloss="{self.frictionloss:.6g}"/>\n'
+            f'<joint name="{joint}"{kind} armature="{self.armature:.6g}" damping="{self.damping:.6g}" frictionloss="{self.frictionloss:.6g}"/>'
+            f"{self._comment()}\n"
             f'<motor name="{joint}" joint="{joint}" gear="{self.gear:.6g}"/>'
         )
+
+    def _comment(self) -> str:
+        return f"  <!-- {100.0 * self.error:.0f} % of the torque is not described -->"
 
     def urdf(self, joint: str) -> str:
         """The joint as URDF, whose dynamics has no armature: it is a comment there."""
         kind, unit = ("prismatic", "kg") if self.slides else ("revolute", "kg m2")
         return (
-            f'<joint name="{joint}" type="{kind}">\n'
+            f'<joint name="{joint}" type="{kind}">{self._comment()}\n'
             f'  <dynamics damping="{self.damping:.6g}" friction="{self.frictionloss:.6g}"/>  <!-- armature {self.armature:.6g} {unit}, gear {self.gear:.6g} -->\n'
             "</joint>"
         )
@@ -103,7 +107,7 @@ def reduce(
     >>> import lostmotion as lm
     >>> found = lm.mujoco.reduce(lm.load("catalogue-robot-joint"), 0.5, 1.0)
     >>> print(found.mjcf("elbow"))
-    <joint name="elbow" armature="0.45..." damping="3.17..." frictionloss="11.6..."/>
+    <joint name="elbow" armature="0.45..." damping="3.17..." frictionloss="11.6..."/>  <!-- ... % of the torque is not described -->
     <motor name="elbow" joint="elbow" gear="100"/>
     """
     scenario = Scenario.of_any(drive)
