@@ -2,8 +2,8 @@
 
 #include <array>
 #include <bit>
-#include <compare>
 #include <cmath>
+#include <compare>
 
 #include "../model/drive_train.hpp"
 
