@@ -23,7 +23,7 @@ int main(int argc, char** argv) {
     std::unique_ptr<Workspace> workspace;
     const auto run = [&] { return train.run_exactly(none, {}, {}, options, nullptr, workspace); };
     if (argc > 1) {
-        options.control = cascade(paper.published_drive, 2.0 * std::numbers::pi / 8192.0, 0.2);
+        options.control = cascade(paper.drive, 2.0 * std::numbers::pi / 8192.0, 0.2);
         for (int k = std::atoi(argv[1]); k > 0; --k) run();
         return 0;
     }
@@ -34,7 +34,7 @@ int main(int argc, char** argv) {
     const double lines = 2.0 * std::numbers::pi / 8192.0;
     for (const Case& c : {Case{"standing still", 0.0, 0.0}, Case{"sine of 0.2 rad", 0.0, 0.2},
                           Case{"sine of 0.2 rad, encoder of 2048 lines", lines, 0.2}}) {
-        options.control = cascade(paper.published_drive, c.resolution, c.amplitude);
+        options.control = cascade(paper.drive, c.resolution, c.amplitude);
         const TrainReport report = run();
         if (report.status != Status::done) return 1;
         const double ms = best_ms(50, run);

@@ -91,7 +91,7 @@ int main(int argc, char** argv) {
     for (const auto& [map, paper] : PaperRun::both()) compare(map, paper);
 
     const PaperRun paper;
-    test::Simulation simulation(paper.published_drive, 1e-3);
+    test::Simulation simulation(paper.drive, 1e-3);
     double t = 0.0;
     const double step = best_ms(20, [&] {
         for (int k = 0; k < 1000; ++k, t += 1e-3) {

@@ -176,13 +176,14 @@ def test_the_rules_of_an_amplifier_by_hand():
     current = np.array([6.0, 6.0, 1.0, 1.0, -6.0, -6.0])
     assert longest_above(time, np.abs(current), 3.0) == pytest.approx(0.5)
     amplifier = Amplifier(continuous_current=3.0, peak_current=5.0, peak_time=1.0, max_dc_voltage=60.0)
-    rms, peak, longest, bus = amplifier_rules(time, current, 2.0, amplifier, 48.0)
+    motor = lm.load("catalogue-robot-joint").motor
+    rms, peak, longest, bus = amplifier_rules(time, current, 2.0, amplifier, 48.0, motor)
     assert rms.use == pytest.approx(math.sqrt((36.0 * 0.5 + 1.5) / 2.0) / 3.0)
     assert (peak.use, peak.verdict) == (pytest.approx(1.2), "warning")
     assert longest.use == pytest.approx(0.5)
     assert bus.use == pytest.approx(0.8)
-    assert amplifier_rules(time, current, 2.0, amplifier, None)[3].verdict == "unknown"
-    assert amplifier_rules(time, current * math.nan, 2.0, amplifier, 48.0)[0].verdict == "unknown"
+    assert amplifier_rules(time, current, 2.0, amplifier, None, motor)[3].verdict == "unknown"
+    assert amplifier_rules(time, current * math.nan, 2.0, amplifier, 48.0, motor)[0].verdict == "unknown"
 
 
 def test_the_peak_current_of_the_amplifier_limits_the_loops():

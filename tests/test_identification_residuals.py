@@ -115,7 +115,7 @@ def test_a_wrong_interpolation_is_reported_and_no_interval_is_narrow(tmp_path: P
     """Held against the truth, the torque is 0.5 ms late on average; the residuals are hundreds of times the noise."""
     result = identified(tmp_path, "linear", "hold", 2e-3)
     size, lost = result.warnings()
-    assert "times the stated 0.0002 rad" in size and "runs of one sign instead of" in size
+    assert "times the stated 0.01146 deg" in size and "runs of one sign instead of" in size
     assert lost.startswith("backlash may have any value within its bounds")
     assert result.lines()[:2] == [size, lost]
     page = write_identification(tmp_path / "out", "axis", result).read_text()

@@ -63,10 +63,12 @@ def test_a_load_above_the_holding_torque_pulls_the_rotor_out(share: float, lost:
     assert (abs(float(end)) > math.pi / N) == lost
 
 
-def test_without_current_the_rotor_rests_in_its_detents() -> None:
-    """A field of a hundredth of T_D: the rotor stays next to where it is put, at the nearest whole step."""
+def test_nearly_without_current_the_rotor_rests_in_its_detents() -> None:
+    """A field of a tenth of T_D at standstill: the rotor stays next to where it is put, at the nearest whole step."""
     step = 2.0 * math.pi / 200
-    end = lm.simulate(alone(angle=3.3 * step, viscous=1e-3, duration=0.3, holding_torque=1e-4, detent_torque=0.02))
+    pulses = {"pulses": {"times": [1e-6, 2e-6], "values": [1, -1]}, "standstill_delay": 1e-6}
+    motor = {"detent_torque": 0.02, "standstill_current": 1e-3, "holding_torque": 2.0}
+    end = lm.simulate(alone({"stepping": pulses}, angle=3.3 * step, viscous=1e-2, duration=0.3, **motor))
     assert float(end.motor_angle[-1]) == pytest.approx(3.0 * step, abs=1e-2 * step)
 
 

@@ -404,4 +404,4 @@ def test_a_refused_pair_shows_what_its_motion_requires() -> None:
 
 def test_the_rules_of_tasks_are_the_ones_that_keys_name() -> None:
     of_keys = {rule for _, rules in RULE_OF.values() for rule in rules.split()}
-    assert of_keys & set(TASK_RULES) == of_keys - {"lost_motion", "inertia_ratio", "holding"}
+    assert of_keys & set(TASK_RULES) == of_keys - {"lost_motion", "inertia_ratio", "holding", "winding_temperature"}

@@ -1,6 +1,7 @@
 """The verdict of a selection: a fit, a reservation, no fit, or not decided, and what each says first."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import pytest
 
@@ -13,6 +14,7 @@ from lostmotion.verdict import Verdict
 
 pa = pytest.importorskip("pyarrow")
 SELECT = Selection(objectives={"mass": "least"})
+STUDY = SimpleNamespace(select=SELECT)
 
 
 def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "") -> RankedCandidate:
@@ -22,7 +24,7 @@ def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "
 
 def verdict(*ranked: RankedCandidate) -> Verdict:
     table = pa.table({"mass": [c.values["mass"] for c in ranked]})
-    return _verdict(table, list(ranked), prices(list(ranked), SELECT), SELECT, [])
+    return _verdict(table, list(ranked), prices(list(ranked), SELECT), STUDY, [])
 
 
 def test_a_pair_that_keeps_all_limits_fits() -> None:

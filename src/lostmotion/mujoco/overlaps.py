@@ -40,7 +40,8 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
             *keys,
             where=f"joint {name!r}",
         )
-    drive = drive.replace(**dict.fromkeys(inclined, 0.0))  # load torques of scenarios are not used
+    if inclined:  # load torques of scenarios are not used
+        drive = drive.replace(**dict.fromkeys(inclined, 0.0))
     if not weights:
         return drive
     changed = {
