@@ -8,9 +8,8 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.servo.hunting.exact_slips import Slips
 from lostmotion.servo.hunting.quantised_slip_end import loudest
-from lostmotion.servo.hunting.sampled_proof import end_of_slip
+from lostmotion.servo.hunting.sampled_proof import Readings, end_of_slip
 from lostmotion.servo.hunting.sampled_stuck_contact import sampled_slip
 from lostmotion.servo.linear_regimes import axis_of
 from refusals import refused
@@ -100,7 +99,7 @@ def test_with_steps_each_recurrence_ends_within_the_bounds() -> None:
 def test_each_recurrence_from_a_reading_leaves_one_of_the_errors_that_are_found(
     step: float, counts: tuple[int, ...], bounded: bool
 ) -> None:
-    rng, slips = random.Random(7), Slips(sampled_slip(axis_of(rotor(3.0, step))))
+    rng, slips = random.Random(7), Readings(sampled_slip(axis_of(rotor(3.0, step))))
     for count in counts:
         found = slips.left(count, bounded=bounded)
         starts = [(rng.uniform(-0.5, 0.5), rng.random()) for _ in range(60)]

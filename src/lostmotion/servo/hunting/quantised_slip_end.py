@@ -11,8 +11,7 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from .sampled_stuck_contact import SampledSlip
-from .state_boxes import Boxes
-from .state_sets import bend_of, need_within_limits
+from .state_boxes import Boxes, bend_of, need_within_limits
 from .stuck_contact import UndecidableError
 
 LONGEST = 3000  # ticks of a slip

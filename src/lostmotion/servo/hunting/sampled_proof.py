@@ -10,15 +10,15 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
+from functools import cached_property
 
 import numpy as np
 
 from ...model.shaft_ratio import turns
 from ...units.practical import counted
 from ..linear_regimes import Axis
-from .exact_slips import Slips
 from .hunting_decision import WatchedRun
 from .proof import MARGIN, WIDER, Proof
 from .quantised_slip_end import finish, loudest
@@ -27,6 +27,7 @@ from .state_boxes import BoxFollower, starts
 from .stuck_contact import UndecidableError
 
 CELLS, PARTS = 4, 2  # of the angle within a step, and of the torque within the ramp of a sample
+ROUNDING = 1e-9  # of an encoder step
 LAST = 3  # readings next to the reference that are followed one by one
 MOST, MOST_BOUNDED = 30, 80  # readings that are followed one by one, to the end or with bounds
 FARTHEST = 400  # reading of a limit cycle for which that is tried
@@ -47,8 +48,8 @@ def prove_sampled(contact: SampledSlip, largest: float) -> Proof:
         found = _band(contact, WIDER[:1]) if contact.excess > 0.0 else None
         return found if found and found.verdict == "hunts" else Proof("hunts", WITHOUT_REST, largest)
     if contact.excess == 0.0:
-        return _last_readings(Slips(contact))
-    found = _about_orbit(Slips(contact))
+        return _last_readings(Readings(contact))
+    found = _about_orbit(Readings(contact))
     return found if found.verdict != "not decided" or found.reason == AT_REST else _band(contact)
 
 
@@ -59,17 +60,61 @@ def end_of_slip(
 
     Raises UndecidableError: the bounds do not hold.
     """
-    reading = (-high * contact.ratio, -low * contact.ratio)
-    least, most = math.inf, -math.inf
+    ends = slips_from(contact, (-high * contact.ratio, -low * contact.ratio), cells, parts, fast)
+    angles = np.concatenate([angle for _, angle in ends])
+    # The first reading of the encoder is within half a step of the angle.
+    return low - angles[:, 1].max() - 0.5 * contact.step, high - angles[:, 0].min() + 0.5 * contact.step
+
+
+def slips_from(
+    contact: SampledSlip, reading: tuple[float, float], cells: int, parts: int, fast: float
+) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Ends of slips forward from readings between two, less the reference: the reading then, in steps, NaN if not known; the angles between
+    which it is."""
     for tick, start in starts(contact, reading, cells, parts):
         flow = BoxFollower(contact, fast)
         settled = flow.follow(start, tick)
-        angles = [settled.angle] + [np.stack(finish(contact, *passed), axis=1) for passed in flow.passed]
-        for angle in angles:
-            if len(angle):
-                # The first reading of the encoder is within half a step of the angle.
-                least, most = min(least, low - angle[:, 1].max()), max(most, high - angle[:, 0].min())
-    return least - 0.5 * contact.step, most + 0.5 * contact.step
+        yield settled.read, settled.angle
+        for passed in flow.passed:
+            angle = np.stack(finish(contact, *passed), axis=1)
+            yield np.full(len(angle), math.nan), angle
+
+
+class Readings:
+    """The errors that slips from each reading of an encoder with steps leave."""
+
+    def __init__(self, contact: SampledSlip) -> None:
+        self.contact = contact
+        self._left: dict[tuple[int, bool], set[int]] = {}
+
+    def left(self, count: int, *, bounded: bool) -> set[int]:
+        """Errors in steps with which the contact is stuck, once all has settled, after a slip forward from one in steps.
+
+        bounded: whether the rest of a slip is bounded as in `finish`, once all speeds exceed what readings can take from them.
+
+        Raises UndecidableError: the boxes become too many, or a limit of the controller may act.
+        """
+        key, c, found = (count, bounded), self.contact, set[int]()
+        if key not in self._left:
+            reading, fast = -count * c.quantum, self._loudest if bounded else math.inf
+            for read, angle in slips_from(c, (reading, reading), CELLS, PARTS, fast):
+                off = (0.5 - ROUNDING, 0.5 + ROUNDING)
+                least, most = np.where(np.isnan(read)[:, None], np.floor(angle / c.step + off), read[:, None]).T
+                for first, last in zip(least, most, strict=True):
+                    found |= {count - k for k in range(int(first), int(last) + 1)}
+            self._left[key] = found
+        return self._left[key]
+
+    def one(self, count: int) -> int:
+        """The error in steps that one of these slips leaves, from the middle of the encoder step."""
+        reading = -count * self.contact.quantum
+        tick, start = next(iter(starts(self.contact, (reading, reading), 1, 1)))
+        start.spread[:] = 0.0
+        return count - round(float(np.mean(BoxFollower(self.contact).follow(start, tick).read)))
+
+    @cached_property
+    def _loudest(self) -> float:
+        return loudest(self.contact)
 
 
 def map_without_steps(contact: SampledSlip, errors: np.ndarray) -> np.ndarray:
@@ -95,7 +140,7 @@ def _share(contact: SampledSlip, largest: float) -> Proof:
     return Proof("not decided", f"a slip may leave {factor:.4g} of its error", 0.0)
 
 
-def _last_readings(slips: Slips) -> Proof:
+def _last_readings(slips: Readings) -> Proof:
     """Proof from as many of the readings next to the reference as can be followed."""
     found = _by_readings(slips, 1, 1)
     for high in range(2, LAST + 1):
@@ -105,7 +150,7 @@ def _last_readings(slips: Slips) -> Proof:
     return found
 
 
-def _by_readings(slips: Slips, low: int, high: int, *, bounded: bool = False) -> Proof:
+def _by_readings(slips: Readings, low: int, high: int, *, bounded: bool = False) -> Proof:
     """Follow slips from each reading between two errors in steps, and from those between which they lead."""
     left: dict[int, set[int]] = {}
     while high - low < (MOST_BOUNDED if bounded else MOST):
@@ -141,7 +186,7 @@ def _decided(contact: SampledSlip, left: dict[int, set[int]]) -> Proof:
     )
 
 
-def _about_orbit(slips: Slips) -> Proof:
+def _about_orbit(slips: Readings) -> Proof:
     """Proof about the readings that slips from the smallest error lead to."""
     counts = [1]
     for _ in range(ORBIT):

@@ -9,13 +9,13 @@ state is lost. Sets that stop are collected by their reading, and go on as one b
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
 from typing import Any
 
 import numpy as np
 
 from .sampled_stuck_contact import SampledSlip
-from .state_sets import Sets, along, bend_of, freed_within, need_within_limits, one_way, propagated
 from .stuck_contact import UndecidableError
 
 UNKNOWNS = (
@@ -26,23 +26,43 @@ BOXES = 20_000  # at most at once
 TICKS = 20_000  # of a slip
 GENERATIONS = 200  # of stops without settling
 CELLS = 8  # of an encoder step, in which stops are collected
+TOO_MANY = "a slip passes too many readings of the encoder to follow them one by one"
 
 
 @dataclass
-class Boxes(Sets):
-    """Boxes of states after the same sample."""
+class Boxes:
+    """Boxes of states after the same sample: arrays with one row for each box."""
 
+    centre: np.ndarray
+    mode: np.ndarray  # 1, 0 or -1: slips forward, is stuck, slips in reverse
+    waited: np.ndarray  # samples for which it has been stuck
+    read: np.ndarray  # last reading less that at the break-away, in steps
+    came: np.ndarray  # direction of the slip that has just ended
     spread: np.ndarray  # (box, state, unknown)
-    origin: np.ndarray  # number of the start
     before: np.ndarray  # the reading before the last
 
+    def __len__(self) -> int:
+        return len(self.centre)
+
+    def take(self, which: np.ndarray | slice) -> Boxes:
+        """Copies of some of them."""
+        return Boxes(*(getattr(self, f.name)[which].copy() for f in fields(self)))
+
     @classmethod
-    def around(cls, low: np.ndarray, high: np.ndarray, origin: np.ndarray, read: np.ndarray) -> Boxes:
-        """Stuck boxes between least and largest values."""
+    def joined(cls, parts: Sequence[Boxes]) -> Boxes:
+        """The boxes of several parts as one."""
+        parts = [part for part in parts if len(part)] or parts[:1]
+        if len(parts) == 1:
+            return parts[0]
+        return cls(*(np.concatenate([getattr(part, f.name) for part in parts]) for f in fields(cls)))
+
+    @classmethod
+    def around(cls, low: np.ndarray, high: np.ndarray, mode: np.ndarray, read: np.ndarray) -> Boxes:
+        """Boxes between least and largest values."""
         n, none = low.shape[1], np.zeros(len(low), int)
         spread = np.zeros((len(low), n, UNKNOWNS + n))
         spread[:, np.arange(n), UNKNOWNS + np.arange(n)] = 0.5 * (high - low)
-        return cls(0.5 * (low + high), none, none.copy(), read, none.copy(), spread, origin, read.copy())
+        return cls(0.5 * (low + high), mode, none, read, none.copy(), spread, read.copy())
 
     def range_of(self, row: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest values of an output."""
@@ -60,7 +80,7 @@ class Boxes(Sets):
         """Boxes of the states that a matrix makes of them."""
         centre = self.centre @ matrix.T
         return replace(
-            self.take(np.arange(len(self))), centre=centre if add is None else centre + add, spread=matrix @ self.spread
+            self.take(slice(None)), centre=centre if add is None else centre + add, spread=matrix @ self.spread
         )
 
     def widen(self, state: int, low: np.ndarray, high: np.ndarray) -> None:
@@ -89,11 +109,75 @@ class Boxes(Sets):
         self.spread[which] = spread
 
 
+def propagated(contact: SampledSlip, boxes: Boxes, slipped: Callable[[Boxes], list[Boxes]]) -> Boxes:
+    """Boxes after a tick; slipping ones go through a function."""
+    boxes.came[:] = 0
+    still = boxes.mode == 0
+    if not still.any():
+        return Boxes.joined(slipped(boxes))
+    stuck, moving = boxes.take(still), boxes.take(~still)
+    after = stuck.moved(contact.stuck)
+    after.waited = after.waited + 1
+    parts = [after] if contact.lag == 0.0 else freed_within(contact, stuck, after)
+    return Boxes.joined([*parts, *(slipped(moving) if len(moving) else ())])
+
+
+def freed_within(contact: SampledSlip, before: Boxes, after: Boxes) -> list[Boxes]:
+    """Boxes that stay stuck over a tick, or the rest of one, and boxes that break away; the torque is monotonic within a tick."""
+    one, two = before.range_of(contact.held), after.range_of(contact.held)
+    stays = (two[0] < contact.breakaway) & (two[1] > -contact.breakaway)
+    parts = [after.take(stays)]
+    for way in (1, -1):
+        top = np.maximum(along(way, *one)[1], along(way, *two)[1])
+        frees = top >= contact.breakaway
+        some, speed = after.take(frees), contact.tick * np.maximum(top[frees] - contact.sliding, 0.0) / contact.inertia
+        some.mode[:], some.waited[:] = way, 0
+        for state, most in ((1, speed), (0, speed * contact.tick)):
+            some.widen(state, *along(way, np.zeros(len(some)), most))
+        parts.append(some)
+    return parts
+
+
+def one_way(boxes: Boxes, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest readings, which go one way in a slip, and stay while a contact is stuck; not where it returns within a tick."""
+    way, free = np.where(boxes.mode != 0, boxes.mode, boxes.came), boxes.mode * boxes.came < 0
+    low = np.where((way >= 0) & ~free, np.maximum(low, boxes.read), low)
+    return low, np.maximum(np.where((way <= 0) & ~free, np.minimum(high, boxes.read), high), low)
+
+
+def bend_of(contact: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> np.ndarray:
+    """Largest amount by which the speed within a tick is below its least value at the ends; 0 where the torque is held.
+
+    noise: largest effect of readings on an output, beside what is in the boxes.
+    """
+    if contact.lag == 0.0:
+        return np.zeros(len(boxes))
+
+    def most(row: np.ndarray) -> np.ndarray:
+        return np.asarray(np.abs(boxes.range_of(row)).max(axis=0) + noise(row))
+
+    push = (np.maximum(most(contact.held), most(contact.command)) + contact.sliding) / contact.inertia
+    rate = push + abs(contact.viscous) * (most(np.eye(len(contact.held))[1]) + contact.tick * push)
+    change = most(contact.command - contact.held) / (contact.lag * contact.inertia)
+    return np.asarray(0.125 * contact.tick**2 * (change + abs(contact.viscous) * rate))
+
+
+def need_within_limits(contact: SampledSlip, boxes: Boxes, noise: Callable[[np.ndarray], Any] = lambda _: 0.0) -> None:
+    """Refuses boxes in which a limit of the controller may act. Raises UndecidableError."""
+    for row, limit in contact.limited:
+        if len(boxes) and (np.abs(boxes.range_of(row)).max(axis=0) + noise(row)).max() >= limit:
+            raise UndecidableError("the limit of the controller may act")
+
+
+def along(way: Any, low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest values in a direction."""
+    return np.minimum(way * low, way * high), np.maximum(way * low, way * high)
+
+
 @dataclass(frozen=True)
 class Settled:
-    """Stuck states in which all but the integrator has settled, by origin."""
+    """Stuck states in which all but the integrator has settled."""
 
-    origin: np.ndarray
     read: np.ndarray  # reading less that at the break-away, in steps
     angle: np.ndarray
     """least and largest angle of the contact's shaft, from the middle of the step of the break-away (box, 2)"""
@@ -120,8 +204,10 @@ def starts(contact: SampledSlip, reading: tuple[float, float], cells: int, parts
             centre[1], spread[1], spread[0, 1] = 0.0, 0.0, half / cells
             slips = np.array([0 if contact.lag else 1])
             none, read = np.zeros(1, int), np.zeros(1)
-            here.append(Boxes(centre[None], slips, none, read, none, spread[None], none, read))
+            here.append(Boxes(centre[None], slips, none, read, none, spread[None], read))
         found.append((tick, Boxes.joined(here)))
+    if not found:
+        raise UndecidableError("the torque does not rise to the break-away within a sample")
     return found
 
 
@@ -146,9 +232,7 @@ class BoxFollower:
                 self._until_stopped(some, tick)
             work = self._collected()
             if not work:
-                if not (found := self.settled):
-                    none = np.zeros(0)
-                    return Settled(none.astype(int), none, np.zeros((0, 2)))
+                found = [Settled(np.zeros(0), np.zeros((0, 2))), *self.settled]
                 return Settled(*(np.concatenate([getattr(s, f.name) for s in found]) for f in fields(Settled)))
         raise UndecidableError("a slip breaks away again before the stuck interval has settled, and does not end")
 
@@ -158,9 +242,7 @@ class BoxFollower:
         for tick in {key[0] for key in self._stopped}:
             here = {key: ends for key, ends in self._stopped.items() if key[0] == tick}
             low, high = (np.array([ends[k] for ends in here.values()]) for k in (0, 1))
-            boxes = Boxes.around(low, high, np.array([key[1] for key in here]), np.array([key[2] for key in here]))
-            boxes.mode = np.array([key[3] for key in here])
-            work.append((boxes, tick))
+            work.append((Boxes.around(low, high, *(np.array([key[k] for key in here]) for k in (1, 2))), tick))
         self._stopped = {}
         return work
 
@@ -178,20 +260,20 @@ class BoxFollower:
             if done.any():
                 one = boxes.take(done)
                 angle = np.stack(one.range_of(np.eye(len(self.contact.held))[0]), axis=1)
-                self.settled.append(Settled(one.origin, one.read, angle))
+                self.settled.append(Settled(one.read, angle))
             stopped = (boxes.came != 0) & ~done
             self._collect(boxes.take(stopped), tick)
             fast = (boxes.mode > 0) & (boxes.range_of(np.eye(len(self.contact.held))[1])[0] > self.fast) & ~stopped
             if fast.any():
                 self.passed.append((boxes.take(fast), tick))
             boxes = boxes.take(~done & ~stopped & ~fast)
-        raise UndecidableError("the slip passes too many readings of the encoder to follow them one by one")
+        raise UndecidableError(TOO_MANY)
 
     def _collect(self, boxes: Boxes, tick: int) -> None:
         low, high = boxes.ends()
         for k in range(len(boxes)):
             cell = math.floor(CELLS * boxes.centre[k, 0] / (self.contact.step or math.inf))
-            key = (tick, int(boxes.origin[k]), float(boxes.read[k]), int(boxes.mode[k]), float(boxes.before[k]), cell)
+            key = (tick, int(boxes.mode[k]), float(boxes.read[k]), float(boxes.before[k]), cell)
             least, most = self._stopped.get(key, (low[k], high[k]))
             self._stopped[key] = np.minimum(least, low[k]), np.maximum(most, high[k])
 
@@ -207,7 +289,7 @@ class BoxFollower:
         sure, going = last[0] > bend, last[1] > 0.0  # the speed is not below 0 at first, or it had stopped before
         unsure = np.flatnonzero(going & ~sure)
         after.clip(unsure, speed, np.zeros(len(unsure)), way[unsure])
-        stops = boxes.take(np.arange(len(boxes)))
+        stops = boxes.take(slice(None))
         stops.clip(unsure, contact.slip[1], way[unsure] * (bend[unsure] - contact.push[1]), -way[unsure])
         stopped = np.flatnonzero(~sure)
         if not len(stopped):
@@ -245,7 +327,7 @@ class BoxFollower:
         low, high = one_way(boxes, *(np.floor(x + 0.5) for x in boxes.range_of(row)))
         while len(several := np.flatnonzero(high > low)):
             if len(boxes) + len(several) > BOXES:
-                raise UndecidableError("the slip passes too many readings of the encoder to follow them one by one")
+                raise UndecidableError(TOO_MANY)
             middle = np.floor(boxes.centre[several] @ row) + 0.5
             border = np.clip(middle, low[several] + 0.5, high[several] - 0.5)
             above, here = boxes.take(several), np.arange(len(several))
