@@ -134,6 +134,39 @@ def test_friction_brings_a_load_to_rest_on_the_flank_that_it_was_pushed_by() -> 
     assert forth.reason == "at rest"
 
 
+def test_an_axis_at_rest_does_not_swing_where_rounding_decides_between_two_positions_or_time_was_extrapolated() -> None:
+    """The rest of the watch, moved by half a window: both positions are at rest and within, which no word on a swing describes."""
+    axis = axis_of(floating(**{"shafts.load.friction_torque": 0.05}))
+    window = 5.0 * ARCMIN
+    moves = repeated(axis, window)
+    assert moves is not None
+    rest = at_rest(moves.axis, moves.longest)
+    assert rest.verdict == "at rest"
+    one = settling(moves, rest, window)[-1]
+    assert (one.state, one.reason) == ("settled", "at rest")
+    other = settling(moves, replace(rest, angles=rest.angles + 0.5 * window), window)[-1]
+    assert (other.state, other.swing) == ("settled, not proved", 0.0)
+    assert "rounding decides" in other.reason
+    outside = settling(moves, replace(rest, angles=rest.angles + 3.0 * window), window)[-1]
+    assert outside.state == "not settled"
+    assert abs(outside.remaining) > window
+    later = replace(rest, watched=rest.watched + 100.0, extrapolated=100.0, times=np.append(rest.times, rest.times[-1] + 100.0))
+    later = replace(later, angles=np.append(rest.angles, rest.angles[-1]))
+    extrapolated = settling(moves, later, window)[-1]
+    assert extrapolated == replace(one, remaining=pytest.approx(one.remaining, abs=1e-12))
+
+
+def test_an_error_that_stands_still_while_an_integrator_winds_up_is_not_called_a_swing() -> None:
+    """What was watched is stuck, and not at rest: the reason of the watch follows."""
+    axis = axis_of(floating(**{"shafts.load.friction_torque": 0.05}))
+    moves = repeated(axis, 5.0 * ARCMIN)
+    assert moves is not None
+    stuck = replace(at_rest(moves.axis, moves.longest), verdict="not decided", reason="stuck, but an integrator moves")
+    last = settling(moves, stuck, 5.0 * ARCMIN)[-1]
+    assert last.state == "settled, not proved"
+    assert "does not move; stuck, but an integrator moves" in last.reason
+
+
 def test_moves_are_repeated_until_a_start_in_the_middle_of_the_gap_is_forgotten() -> None:
     """The first move of a fresh start crosses half of the gap, the same move of a cycle all of it."""
     moves, _ = judged(floating(**{"shafts.load.friction_torque": 0.05}), ARCMIN)

@@ -26,6 +26,7 @@ SPREADS = (
 )
 COARSE = 20  # times the interval between samples, at most, of a long run
 SAME = 0.01  # of the window, by which the run and what was watched may differ at the end
+STILL = 1e-9  # of the window: an error that changes by less does not move
 LATER = 0.03  # of what was watched, from which on a swing counts that becomes ever slower
 PERIODS = 20  # of an input that never rests, for which the last position is held
 SHARE = 0.001  # of the longest move: the least window by default
@@ -209,7 +210,7 @@ def settling(moves: Moves, rest: AtRest, window: float) -> list[Settling]:
 
     rest: what follows the last move.
     """
-    seen = _seen(moves, rest)
+    seen = _seen(moves, rest, window)
     held = len(moves.reference.moves) - 1
     found = []
     for k in range(max(held - moves.count + 1, 0), held):
@@ -233,25 +234,34 @@ def _badness(s: Settling) -> tuple[bool, float]:
 
 @dataclass(frozen=True)
 class _Seen:
-    """Run of the repeated moves and of what follows."""
+    """Run of the repeated moves and of what follows, as long as that was watched."""
 
     time: np.ndarray
     error: np.ndarray
     unseen: np.ndarray
-    covers: bool  # whether it covers all that was watched after the last move
+    watched: tuple[np.ndarray, np.ndarray] | None = (
+        None  # instants and error of the watch, if it rests elsewhere than the run ends
+    )
 
     def during(self, begin: float, end: float = math.inf) -> np.ndarray:
         """Indices of the samples between two instants."""
         return np.flatnonzero((self.time >= begin) & (self.time <= end))
 
 
-def _seen(moves: Moves, rest: AtRest) -> _Seen:
+def _seen(moves: Moves, rest: AtRest, window: float) -> _Seen:
     moving = moving_input(moves.axis.scenario)
     end = _patience(moves) if moving else rest.begin + rest.watched - rest.extrapolated
     every = min(max(math.ceil(end / moves.interval / MOST), 1), COARSE)
-    covers = bool(moving) or (rest.extrapolated == 0.0 and end <= MOST * every * moves.interval)
     data = ran(moves.axis, duration=min(end, MOST * every * moves.interval), sample_interval=every * moves.interval)
-    return _Seen(data["time"], *errors_of(moves.axis, data), covers)
+    time, (error, unseen) = data["time"], errors_of(moves.axis, data)
+    instants, watched = rest.begin + rest.times, moves.reference.moves[-1].to - rest.angles
+    later = instants > time[-1]
+    if rest.verdict == "at rest":
+        k = max(int(np.argmax(later)) if later.any() else len(later), 1) - 1
+        if abs(watched[k] - np.interp(instants[k], time, error)) > SAME * window:
+            return _Seen(time, error, unseen, (instants, watched))
+    error, unseen = np.append(error, watched[later]), np.append(unseen, np.full(int(later.sum()), unseen[-1]))
+    return _Seen(np.append(time, instants[later]), error, unseen)
 
 
 def _patience(moves: Moves) -> float:
@@ -282,48 +292,54 @@ def _after(end: float, time: np.ndarray, error: np.ndarray, window: float) -> fl
     return round(settled(time, error, window) + float(time[0]) - end, 9)
 
 
+def _from(time: np.ndarray, share: float) -> int:
+    """Index of the first sample from a share of the time on."""
+    return int(np.searchsorted(time, time[0] + share * (time[-1] - time[0])))
+
+
 def _swing(time: np.ndarray, error: np.ndarray, begin: float = 0.5) -> float:
     """Half of what an error swings by from a share of its course on; 0 where it moves one way."""
-    first = int(begin * len(error))
+    first = _from(time, begin)
     late = error[first:]
     turns_around = any(len(rises_of(time[first:], way * late)) for way in (1.0, -1.0))
     return 0.5 * float(np.ptp(late)) if turns_around else 0.0
 
 
 def _held(moves: Moves, rest: AtRest, seen: _Seen, window: float) -> Settling:
-    """Whether the error stays within the window for ever."""
+    """Whether the error stays within the window for ever. Where rounding decides between two motions, the worse one counts."""
+    after = seen.during(moves.reference.intervals()[-1][1])
+    courses = [(seen.time[after], seen.error[after]), *([] if seen.watched is None else [seen.watched])]
+    return max((_kept(moves, rest, seen, course, window) for course in courses), key=_badness)
+
+
+def _kept(moves: Moves, rest: AtRest, seen: _Seen, course: tuple[np.ndarray, np.ndarray], window: float) -> Settling:
+    """Whether the error of one course stays within the window for ever."""
     end, to = moves.reference.intervals()[-1][1], moves.reference.moves[-1].to
-    after = seen.during(end)
-    time, error = seen.time[after], seen.error[after]
-    late = error[3 * len(error) // 4 :] if seen.covers else to - np.array(rest.range)
-    worst, rests = float(late[np.abs(late).argmax()]), rest.verdict == "at rest"
-    if rests and seen.covers:
-        worst = float(error[-1])
-        if abs(to - rest.range[1] - worst) > SAME * window:
-            rest = replace(rest, verdict="not decided", reason="rounding decides between two motions")
+    time, error = course
+    rests = rest.verdict == "at rest" and (seen.watched is None or course is seen.watched)
+    late = error[_from(time, 0.75) :]
+    worst = float(error[-1] if rests else late[np.abs(late).argmax()])
     within = _after(end, time, error, window)
-    goes_on = rest.verdict == "not decided" and seen.covers and abs(_limit(error)) > window
-    goes_on = goes_on and bool(np.abs(error[int(LATER * len(error)) :]).max() > window)  # as far as its flanks let it
+    goes_on = rest.verdict == "not decided" and abs(_limit(time, error)) > window
+    goes_on = goes_on and bool(np.abs(error[_from(time, LATER) :]).max() > window)  # as far as its flanks let it
     state: State = "not settled"
-    if abs(worst) > window or goes_on or (seen.covers and math.isnan(within)):
-        watched = rest.watched or float(time[-1]) - end
-        reason = "at rest" if rest.verdict == "at rest" else f"{watched:.3g} s after the moves"
+    if abs(worst) > window or goes_on or math.isnan(within):
+        reason = "at rest" if rests else f"{rest.watched or float(time[-1]) - end:.3g} s after the moves"
     else:
-        state, reason = _within(moves, rest, time - end, error, window, covers=seen.covers)
+        state, reason = _within(moves, rest, course, window, one=seen.watched is None)
     within = within if state.startswith("settled") else math.nan
-    swing = 0.0
-    if not rests:
-        swing = _swing(time, error, LATER) if seen.covers else 0.5 * float(np.ptp(late))
+    swing = 0.0 if rests else _swing(time, error, LATER)
     return Settling(end, to, state, within, True, reason, worst, float(seen.unseen[-1]), swing)
 
 
-def _limit(error: np.ndarray) -> float:
+def _limit(time: np.ndarray, error: np.ndarray) -> float:
     """Limit of an error that moves one way, if its changes go on to grow or shrink as in the last two eighths of its course.
 
     A load that floats through its backlash without friction is within the window for ever longer times, at an ever lower speed.
     """
-    late = error[3 * len(error) // 4 :]
-    a, b, c = late[[0, len(late) // 2, -1]].tolist()
+    first = _from(time, 0.75)
+    late = error[first:]
+    a, b, c = np.interp([time[first], 0.5 * (time[first] + time[-1]), time[-1]], time, error).tolist()
     one_way = np.all(np.diff(late) >= 0.0) or np.all(np.diff(late) <= 0.0)
     if not one_way or b in (a, c):
         return float(c)
@@ -332,32 +348,40 @@ def _limit(error: np.ndarray) -> float:
 
 
 def _within(
-    moves: Moves, rest: AtRest, after: np.ndarray, error: np.ndarray, window: float, *, covers: bool
+    moves: Moves, rest: AtRest, course: tuple[np.ndarray, np.ndarray], window: float, *, one: bool
 ) -> tuple[State, str]:
     """Whether an error that was seen to remain within the window stays there, and the reason.
 
     Rest is a proof, if the encoder of the position resolves the window: where an axis rests within a step depends on how it came there.
     A steady swing is none: a quantised loop may be chaotic, and its state never repeats.
     """
-    if rest.verdict == "at rest" and covers:
+    if rest.verdict == "at rest":
+        if not one:
+            return (
+                "settled, not proved",
+                "rounding decides between two motions, both of which were watched to stay within",
+            )
         if window < moves.axis.position_encoder[1]:
             return (
                 "settled, not proved",
                 "at rest, by chance: the window is finer than a step of the position's encoder",
             )
         return "settled", "at rest"
-    name, watched = moving_input(moves.axis.scenario), float(after[-1])
-    if covers and _swings_within(error, window):
-        under = f" under {name}" if name else ""
-        return "settled, not proved", f"watched for {watched:.3g} s, in which it swings steadily{under}"
+    (time, error), name = course, moving_input(moves.axis.scenario)
+    watched = f"watched for {rest.watched or time[-1] - moves.reference.intervals()[-1][1]:.3g} s, in which it"
+    if np.ptp(error[_from(time, 0.5) :]) <= STILL * window:
+        return "settled, not proved", f"{watched} does not move{f'; {rest.reason}' if rest.reason else ''}"
+    if _swings_within(time, error, window):
+        return "settled, not proved", f"{watched} swings steadily{f' under {name}' if name else ''}"
     if name:
         return "not decided", f"{name} never comes to rest, and the error does not repeat"
     why = rest.reason if rest.verdict == "not decided" else f"{rest.verdict} near the edge of the window"
     return "not decided", f"within the window {rest.watched:.3g} s after the moves, but not proved to stay there: {why}"
 
 
-def _swings_within(error: np.ndarray, window: float) -> bool:
+def _swings_within(time: np.ndarray, error: np.ndarray, window: float) -> bool:
     """Whether least and largest error of each part of the last half are as good as the same, and far enough from the window."""
-    parts = np.array_split(error[len(error) // 2 :], PERIODS // 2)
+    edges = np.linspace(0.5 * (time[0] + time[-1]), time[-1], PERIODS // 2 + 1)
+    parts = np.split(error, np.searchsorted(time, edges[:-1]))[1:]
     ends = np.array([(part.min(), part.max()) for part in parts if len(part)])
     return bool(np.abs(ends).max() + SPREADS * np.ptp(ends, axis=0).max() <= window)

@@ -357,12 +357,7 @@ class Decision:
     reason: str
     watched: float  # [s], since the inputs have come to rest
     frequency: float  # [Hz]; NaN unless it hunts
-    range: np.ndarray  # least and largest value of each variable over the last quarter of the watch (2, variable)
-
-    @property
-    def swing(self) -> np.ndarray:
-        """Largest less least value of each variable."""
-        return np.asarray(self.range[1] - self.range[0])
+    swing: np.ndarray  # largest less least value of each variable over the last quarter of the watch
 
 
 def decide(watch: WatchedRun, first: float, most: float) -> Decision:
@@ -407,9 +402,7 @@ def _decision(watch: WatchedRun, verdict: Verdict, reason: str) -> Decision:
         moving = int(np.argmax(swing > watch.noise))
         quick = watch.quick_frequency(moving, 0.5 * swing[moving])
         frequency = 1.0 / watch.period() if math.isnan(quick) else quick
-    last = watch.part(0.75, 1.0)[1]
-    ends = np.array([last.min(axis=0), last.max(axis=0)]) if len(last) else np.full((2, len(watch.names)), math.nan)
-    return Decision(verdict, reason, watched, frequency, ends)
+    return Decision(verdict, reason, watched, frequency, swing)
 
 
 def _why(watch: WatchedRun, outlook: Outlook) -> str:

@@ -5,9 +5,11 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from operator import attrgetter
 from typing import Any
+
+import numpy as np
 
 from ...inputs.part import Part
 from ...model.couplings import Commanded
@@ -48,8 +50,10 @@ class AtRest:
     """when the inputs have come to rest [s]"""
     extrapolated: float = 0.0
     """part of the time that was watched in which all contacts are stuck, which was not run [s]"""
-    range: tuple[float, float] = (math.nan, math.nan)
-    """least and largest angle of the reference's shaft in the last quarter [rad]"""
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
+    """instants that were watched, from the end of the reference [s]"""
+    angles: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
+    """angle of the reference's shaft at these instants [rad]"""
 
     @property
     def cycles(self) -> bool:
@@ -137,9 +141,17 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
         )
         found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
     motor, load = 0.5 * found.swing
-    ends = (float(found.range[0, 1]), float(found.range[1, 1]))
     return AtRest(
-        found.verdict, found.reason, found.watched, motor, load, found.frequency, watch.settled, watch.skipped, ends
+        found.verdict,
+        found.reason,
+        found.watched,
+        motor,
+        load,
+        found.frequency,
+        watch.settled,
+        watch.skipped,
+        watch.times,
+        watch.rows[:, 1],
     )
 
 
