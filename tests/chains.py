@@ -1,7 +1,5 @@
 """Chains of masses, as long as a test needs them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import lostmotion as lm

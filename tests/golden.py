@@ -7,8 +7,6 @@ Only numbers that the core itself computes are held to the bit. What numpy, scip
 last bits may differ between machines and versions: the Floquet multipliers are compared within `TOLERANCE`.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import json

@@ -5,8 +5,6 @@
 prints for each parameter how many of the intervals hold its value. The result stands in docs/verification.md.
 """
 
-from __future__ import annotations
-
 import sys
 import tempfile
 from dataclasses import replace

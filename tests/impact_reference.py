@@ -4,8 +4,6 @@ Nothing here is the core's. Gaps are kept from their nearer end, so that the sma
 impact is followed until the flanks part by a 1e-12th of the speeds of the chain.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass, field

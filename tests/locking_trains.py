@@ -1,7 +1,5 @@
 """Random trains with rigid gears that lock themselves, and the same with ever stiffer meshes."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The C interface compiled to WebAssembly: other vectors, another mathematical library, no processor of its own."""
 
-from __future__ import annotations
-
 import importlib.util
 import math
 from functools import cache

@@ -1,7 +1,5 @@
 """A planar arm in MuJoCo whose two joints are turned by drives, and the same as closed equations, for tests and the benchmark."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

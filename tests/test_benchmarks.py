@@ -1,7 +1,5 @@
 """The programs of the benchmark compile, and its modules can be imported: `make bench` runs too long for a test."""
 
-from __future__ import annotations
-
 import importlib
 import subprocess
 from pathlib import Path

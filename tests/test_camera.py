@@ -1,7 +1,5 @@
 """A camera in the loop and the tracker of its frames: closed forms of latency and noise, what a frame shows, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Frequency response of closed loops: the exact sampled linear loop, long runs, encoders with steps, frequencies that do not fit."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

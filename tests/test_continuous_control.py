@@ -1,7 +1,5 @@
 """Continuous controllers in a train, against closed forms and independent integrations."""
 
-from __future__ import annotations
-
 import functools
 import itertools
 import json

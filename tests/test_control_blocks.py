@@ -1,7 +1,5 @@
 """The blocks of controllers, tick by tick: recomputed from docs/control.md alone, with the exact drive by the matrix exponential."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import zlib

@@ -1,7 +1,5 @@
 """Dampers between two shafts: closed forms of runs, energies, sensitivities and linear models; where they stand beside the rest."""
 
-from __future__ import annotations
-
 import ctypes as c
 import math
 from typing import Any

@@ -73,16 +73,10 @@ def test_a_run_has_the_bits_of_python(library: c.CDLL, name: str) -> None:  # no
     assert set(there) == set(here)
     for variable in there:
         assert np.array_equal(there[variable], here[variable].to_numpy(), equal_nan=True), variable
-
-
-def test_the_efficiency_of_a_gearbox_that_reverses_is_that_of_one_that_does_not(library: c.CDLL) -> None:  # noqa: F811
-    straight = lm.load("paper-2dof-nl-small")
-    a, b = (
-        Scenario(library, lm.portable.description(straight.replace(**{"gearbox.ratio": r}), parameters=False)).run()
-        for r in (straight.gearbox.ratio, -straight.gearbox.ratio)
-    )
-    assert np.nanmax(a["efficiency"]) > 0.1
-    assert np.array_equal(a["efficiency"], b["efficiency"], equal_nan=True)
+    if name == "paper-2dof-nl-small":  # the efficiency of a gearbox that reverses is that of one that does not
+        reversing = lm.load(name, {"gearbox.ratio": -lm.load(name).gearbox.ratio})
+        back = Scenario(library, lm.portable.description(reversing, parameters=False)).run()
+        assert np.array_equal(there["efficiency"], back["efficiency"], equal_nan=True)
 
 
 @pytest.fixture
@@ -237,14 +231,8 @@ def test_a_simulation_goes_on_with_another_inertia(library: c.CDLL) -> None:  # 
     assert library.lm_go_on_with(simulation.handle, there.handle, c.c_double(-1.0)) == INVALID
 
 
-SMALL = {
-    "load.inertia": 2.7,
-    "gearbox.ratio": 80.0,
-    "motor.friction_torque": 0.013,
-    "command.amplitude": 0.06,
-    "gearbox.hysteresis.efficiency": 0.9,
-    "gearbox.stiffness.preload": 3.0,
-}
+SMALL = {"load.inertia": 2.7, "gearbox.ratio": 80.0, "motor.friction_torque": 0.013, "command.amplitude": 0.06}
+SMALL |= {"gearbox.hysteresis.efficiency": 0.9, "gearbox.stiffness.preload": 3.0}
 
 
 def changed_in_c(library: c.CDLL, scenario: Any, values: dict[str, float]) -> Scenario:  # noqa: F811
@@ -342,6 +330,7 @@ def derived(of: Derivation, base: np.ndarray, key: str, value: float) -> np.ndar
 def test_each_value_gives_the_numbers_of_the_changed_scenario(name: str) -> None:
     scenario = lm.load(name)
     base, of = numbers_of(scenario), derivation_of(scenario, numbers_of)
+    assert np.array_equal(numbers_of(scenario), base) and np.array_equal(numbers_of(lm.load(name)), base)  # recording leaves it as it is
     step, seen = max(1, len(of.parameters) // 30), 0
     for p in of.parameters[::step]:
         value = 1.03 * p.value if p.value != 0.0 else 1e-4
@@ -369,14 +358,6 @@ def test_keys_that_follow_by_any_law_are_parameters() -> None:
     assert not any(key.endswith("torque.phase") for key in keys["position-axis"])
 
 
-def test_recording_leaves_runs_as_they_are() -> None:
-    scenario = lm.load("position-axis")
-    before = numbers_of(lm.load("position-axis"))
-    derivation_of(scenario, numbers_of)
-    assert np.array_equal(numbers_of(lm.load("position-axis")), before)
-    assert np.array_equal(numbers_of(scenario), before)
-
-
 def sealed(numbers: np.ndarray) -> np.ndarray:
     """With the checksum of what they are, by another implementation of CRC-32."""
     return np.concatenate([numbers[:2], [zlib.crc32(numbers[3:].astype("<f8").tobytes())], numbers[3:]])
@@ -401,12 +382,6 @@ def test_numbers_that_are_no_description_are_refused(
     scenario = Scenario(library, change(lm.portable.description(lm.load("paper-2dof-nl-small"), parameters=False)))
     assert not scenario.handle
     assert said in scenario.refused
-
-
-def test_a_law_of_ones_own_cannot_be_described() -> None:
-    axis = lm.load("speed-axis")
-    own = {"law": True, "sample_time": 1e-3, "reference": {"kind": "torque"}, "encoder": {"ideal": True}}
-    assert "controller of motor: has a law of your own" in refused(lambda: lm.portable.description(axis.replace(controller=own)))
 
 
 def test_rates_and_guards_serve_an_integrator_of_the_caller_s_own(library: c.CDLL) -> None:  # noqa: F811
@@ -450,6 +425,9 @@ def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
     described = Scenario(library, lm.portable.description(delayed, parameters=False))
     assert library.lm_scenario_give_references(described.handle, 1) == 100
     assert "has to know the past of its reference" in described.error()
+    own = {"law": True, "sample_time": 1e-3, "reference": {"kind": "torque"}, "encoder": {"ideal": True}}
+    law = lm.load("speed-axis").replace(controller=own)
+    refused(lambda: lm.portable.description(law), match="controller of motor: has a law of your own")
 
 
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "two-motors-one-ring"])

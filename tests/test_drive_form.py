@@ -1,7 +1,5 @@
 """The short form with a given motion of the load and with flanks that strike: the results of the long form, to the last bit."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Inputs beyond what numbers resolve are refused; an energy ledger that does not close is reported."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

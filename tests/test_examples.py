@@ -1,7 +1,5 @@
 """The examples on controllers: a compiled law, a filter from python-control, an environment for reinforcement learning."""
 
-from __future__ import annotations
-
 import importlib.util
 import sys
 from types import ModuleType

@@ -1,7 +1,5 @@
 """The firmware of a hobby servo: sample by sample against an independent law, without sample time against an integrator."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

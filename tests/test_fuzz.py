@@ -1,7 +1,5 @@
 """A few cases of `make fuzz`, the same each time, and the watchdog that runs them."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,7 +1,5 @@
 """The virtual rig's experiments as logs: the gearbox that they are of is found in them again."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,7 +1,5 @@
 """Conditions on files and folders, and errors of conditions that the fit has not seen, against closed forms."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

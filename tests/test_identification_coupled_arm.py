@@ -1,7 +1,5 @@
 """Two axes coupled by a mass matrix: their parameters from torques and motion, by closed-form logs."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """The cycloidal actuators: the shipped extract of their logs gives what the author's thesis states of them."""
 
-from __future__ import annotations
-
 import importlib.util
 from types import ModuleType
 

@@ -1,7 +1,5 @@
 """The EMPS axis, from public data that are not shipped (Janot, Gautier, Brunot 2019): in open loop and under its controller."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,7 +1,5 @@
 """Parts of a servo's firmware from logs of its position: the logs are of a law written down by itself."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

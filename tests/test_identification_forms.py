@@ -1,7 +1,5 @@
 """Rigs in the short form and as an axis: keys, inputs and variables as their files have them, values of the closed form of the motion."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """What a log lacks: units other than SI, samples without a number, and pauses do not change the values that are found."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Which logs of a task are used: bad ones are left out and listed, a task that is wrong is refused, each in one line."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Callable

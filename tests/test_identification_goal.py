@@ -1,7 +1,5 @@
 """A goal that the firmware of a servo filters and limits: closed forms of its course, and limits found from logs."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

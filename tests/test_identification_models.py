@@ -1,7 +1,5 @@
 """Candidate models are compared under one course of inputs, and the answer holds the parameters of the chosen one alone."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Unidentifiable parameters follow from the null directions, and their remedies from the missing channels."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 from typing import Any

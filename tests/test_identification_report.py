@@ -1,7 +1,5 @@
 """The answer and its page: errors have a unit, a channel and the logs that they are of."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

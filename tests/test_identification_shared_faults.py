@@ -1,7 +1,5 @@
 """Faults that many logs share are the model's: they are said once, with what the logs have in common, and no log is dropped."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Rigid flanks with backlash: impacts with a coefficient of restitution, and contact where they have accumulated."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Flanks of several gears that strike at once or in turn, gears that lock in motion, clutches that are closed at the start."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import os

@@ -1,7 +1,5 @@
 """Feedforward by the model of the drive, its adaptation, and the load observer."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Where rigid friction has no motion, and where a search for it must not fail: the cases that random trains found."""
 
-from __future__ import annotations
-
 import cmath
 import itertools
 import math

@@ -1,7 +1,5 @@
 """The last sample of a run is its end, also where the duration is no multiple of the sample interval."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

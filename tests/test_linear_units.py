@@ -1,7 +1,5 @@
 """What programs print and write of axes without anything that turns has no unit of rotation."""
 
-from __future__ import annotations
-
 import html
 import re
 import tomllib

@@ -1,7 +1,5 @@
 """The answer of a drive to its load over a step, and snapshots: closed forms, differences, and the same bits again."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Shafts coupled by a mass matrix: against scipy's exponential, rigid differentials, the adaptive solver and closed forms."""
 
-from __future__ import annotations
-
 import itertools
 import random
 from pathlib import Path

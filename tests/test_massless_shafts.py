@@ -1,7 +1,5 @@
 """Shafts without inertia that dampers hold: closed forms, limits of small inertias, and what is refused."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

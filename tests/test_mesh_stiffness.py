@@ -1,7 +1,5 @@
 """The stiffness of a mesh over the angle: parametric resonance against Floquet's theory, energy, and what files may say."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

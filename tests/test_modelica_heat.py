@@ -4,8 +4,6 @@ Parameters: Modelica Standard Library 4.1, Mechanics/Rotational/Examples/HeatLos
 references integrate the equations of the library's documentation by scipy, with event logic of their own.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

@@ -1,7 +1,5 @@
 """Present values against limits, and what too few logs leave undecided: logs by a closed form, and series of known level."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

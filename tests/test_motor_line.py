@@ -1,7 +1,5 @@
 """Motors known by stall torque and no-load speed, without electrical time constant; drag curves that fall."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

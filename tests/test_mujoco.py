@@ -1,7 +1,5 @@
 """Drives in MuJoCo: against closed systems of equations, the exact core and standing still."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Drives in MuJoCo on a floating base: contacts of the feet, standing, tendons, equalities, restored states."""
 
-from __future__ import annotations
-
 import math
 import sys
 from typing import Any

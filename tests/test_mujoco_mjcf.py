@@ -1,7 +1,5 @@
 """Drives of the joints that an MJCF model describes: against MuJoCo itself; what is not taken over is refused by name."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

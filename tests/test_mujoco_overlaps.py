@@ -1,7 +1,5 @@
 """Drives in MuJoCo: what robot and drive both have acts once, is refused by name, or is replaced."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

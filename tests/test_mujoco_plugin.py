@@ -1,7 +1,5 @@
 """The actuator plugin of MuJoCo: against `lm.mujoco.attach`, with states of mjData, and wrong use."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -1,7 +1,5 @@
 """The pointing report: closed forms of pointing errors, and the removal of causes."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from types import SimpleNamespace

@@ -1,7 +1,5 @@
 """Random linear axes of all their elements: exact against adaptive solver, and the energy that is turned over."""
 
-from __future__ import annotations
-
 import random
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Ratchets: free backward, and held again at the next tooth."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -64,16 +64,10 @@ def test_random_moves_keep_their_limits_and_hit_their_ends(moves: tuple[np.ndarr
         assert np.all(np.abs(values) <= limit * (1.0 + 4.0 * EPS))
     assert np.all(np.sign(distance) * states[1] >= 0.0)
     assert np.all(np.diff(times, axis=0) >= 0.0)
-
-
-@pytest.mark.parametrize("moves", [MOVES, WIDE, (*MOVES[:3], np.inf)], ids=["moves", "wide", "trapezoidal"])
-def test_position_speed_and_acceleration_are_continuous_in_random_moves(moves: tuple[np.ndarray, ...]) -> None:
     t, c, s, _ = np.array([profiles.segment_durations(*map(float, move)) for move in each(moves)]).T
-    durations = np.array([t, c, t, s, t, c, t])
-    _, *states = segments(*moves)
-    ends = taylor([x[:-1] for x in states], durations)
-    checked = 3 if np.all(np.isfinite(moves[3])) else 2  # a trapezoidal speed has steps of acceleration
-    for state, end in list(zip(states, ends, strict=True))[:checked]:
+    ends = taylor([x[:-1] for x in (*states, jerks)], np.array([t, c, t, s, t, c, t]))
+    continuous = 3 if np.all(np.isfinite(moves[3])) else 2  # a trapezoidal speed has steps of acceleration
+    for state, end in list(zip(states, ends, strict=False))[:continuous]:
         # Of the sum of four terms, each no larger than the largest of its kind in the move.
         assert np.all(np.abs(end - state[1:]) <= 16.0 * EPS * np.abs(state).max(axis=0))
 
@@ -133,12 +127,10 @@ def test_the_duration_of_a_move_is_its_closed_form(move: tuple[float, ...]) -> N
     assert np.all(np.isfinite(found))
     assert found[0, -1] == pytest.approx(move[4], rel=1e-14)
     assert found[1, -1] == move[0]
-
-
-def test_a_segment_that_a_move_does_not_have_takes_no_time() -> None:
-    for name, without in (("speed not reached", [3]), ("acceleration not reached", [1, 5]), ("neither reached", [1, 3, 5])):
-        durations = np.diff(segments(*CLOSED_FORMS[name][:4])[0])
-        assert np.flatnonzero(durations == 0.0).tolist() == without
+    # A segment that a move does not have takes no time.
+    without = {"speed not reached": [3], "acceleration not reached": [1, 5], "neither reached": [1, 3, 5]}
+    for name, places in without.items():
+        assert move is not CLOSED_FORMS[name] or np.flatnonzero(np.diff(found[0]) == 0.0).tolist() == places
 
 
 # --- references ---
@@ -407,10 +399,6 @@ BAD = [
 ]  # fmt: skip
 
 
-def test_the_good_reference_is_one() -> None:
-    assert lm.PositionReference(**GOOD).pieces()[-1][1:] == (1.0, 0.0, 0.0, 0.0)
-
-
 @pytest.mark.parametrize(("change", "sentence"), BAD, ids=[s for _, s in BAD])
 def test_a_reference_that_cannot_be_is_refused_in_one_line(change: dict[str, object], sentence: str) -> None:
     assert sentence in refused(lambda: lm.PositionReference(**GOOD | change))
@@ -494,15 +482,10 @@ def test_a_timed_move_has_the_published_coefficients_of_its_law(law: str) -> Non
     assert value == pytest.approx(distance - value[::-1], abs=1e-3)  # symmetric, over a step of 39 us
     assert np.gradient(value, t)[1:-1] == pytest.approx(derivatives[0][1:-1], abs=1e-3)
     assert [float(reference.at(x)[0]) for x in (0.5, 1.5)] == [distance, 0.0]
-
-
-def test_the_fifth_order_is_its_polynomial() -> None:
-    reference = lm.PositionReference(moves=[{"to": 2.0, "duration": 3.0, "law": "fifth_order"}])
-    t = np.linspace(0.0, 3.0, 1001)
-    x = t / 3.0
-    value, speed, *_ = reference.at(t)
-    assert value == pytest.approx(2.0 * (10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5), abs=1e-4)
-    assert speed == pytest.approx(20.0 * (x * (1.0 - x)) ** 2, abs=1e-4)
+    if law == "fifth_order":
+        x = t / duration
+        assert value == pytest.approx(distance * (10.0 * x**3 - 15.0 * x**4 + 6.0 * x**5), abs=1e-4)
+        assert derivatives[0] == pytest.approx(30.0 * distance / duration * (x * (1.0 - x)) ** 2, abs=1e-3)
 
 
 def test_a_duration_that_limits_forbid_names_the_least_one() -> None:

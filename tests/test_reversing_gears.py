@@ -1,7 +1,5 @@
 """Gears of negative ratio: closed forms, and the mirrored motion of what is behind them."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Every run ends: by itself, as its adaptive solution says, or within a second of an interruption."""
 
-from __future__ import annotations
-
 import random
 import signal
 import time

@@ -1,7 +1,5 @@
 """Satellites as targets: published verification values of SGP4, another library's azimuth and elevation, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from datetime import UTC, datetime, timedelta
 from importlib.resources import files

@@ -31,17 +31,10 @@ FINE = 40  # samples in a sample time of the controller
 SPEED, ACCELERATION, DISTANCE = 4.0, 40.0, 1.2
 INERTIA_1, EFFICIENCY = 2e-6, 0.8
 
-MOTOR = lm.Motor(
-    rotor_inertia=1e-5,
-    friction_torque=0.01,
-    rated_torque=0.4,
-    rated_speed=400.0,
-    rated_voltage=48.0,
-    electrical_time_constant=5e-4,
-    armature_voltage_constant=10.0,
-    voltage_limit=48.0,
-    limits={"continuous_torque": 0.4, "resistance": 1.0, "torque_constant": 0.1, "max_current": 20.0},
-)
+RATED = {"rated_torque": 0.4, "rated_speed": 400.0, "rated_voltage": 48.0, "voltage_limit": 48.0}
+RATED |= {"electrical_time_constant": 5e-4, "armature_voltage_constant": 10.0}
+LIMITS = {"continuous_torque": 0.4, "resistance": 1.0, "torque_constant": 0.1, "max_current": 20.0}
+MOTOR = lm.Motor(rotor_inertia=1e-5, friction_torque=0.01, **RATED, limits=LIMITS)
 GEARBOX = lm.Gearbox(
     ratio=RATIO,
     inertia=INERTIA_1,
@@ -50,18 +43,12 @@ GEARBOX = lm.Gearbox(
     stiffness={"kind": "rigid"},
     losses={"kind": "constant_efficiency", "efficiency": EFFICIENCY},
 )
+LIMITED = {"kind": "position", "speed": SPEED, "acceleration": ACCELERATION}
 TABLES: dict[str, Any] = {
     "title": "there and back",
     "task": {"cycle": "1 s", "settling_window": "5 arcmin"},
     "load": {"inertia": J, "friction_torque": FRICTION},
-    "controller": {
-        "reference": {
-            "kind": "position",
-            "speed": SPEED,
-            "acceleration": ACCELERATION,
-            "moves": [{"to": DISTANCE, "dwell": 0.1}, {"to": 0.0}],
-        }
-    },
+    "controller": {"reference": LIMITED | {"moves": [{"to": DISTANCE, "dwell": 0.1}, {"to": 0.0}]}},
     "motor": {"voltage_limit": "48 V", "limits": {"max_current": "20 A"}},
     "vary": [
         {"key": "gearbox", "values": ["schaeffler-rt1-h-20-100", "bonfiglioli-tr060-2-36"]},
@@ -70,7 +57,7 @@ TABLES: dict[str, Any] = {
 }
 
 
-ONE_WAY = TABLES["controller"] | {"reference": TABLES["controller"]["reference"] | {"moves": [{"to": DISTANCE}]}}
+ONE_WAY = {"reference": LIMITED | {"moves": [{"to": DISTANCE}]}}
 
 
 def changed(**tables: Any) -> dict[str, Any]:
@@ -93,20 +80,13 @@ def test_an_interrupted_selection_keeps_its_finished_pairs(tmp_path: Path):
     ratios = ", ".join(f"{3.0 + 0.02 * k:.2f}" for k in range(402))
     moves = "[{ to = 1.2, dwell = 0.1 }, { to = 0.0 }]"
     file.write_text(
-        f"""[task]
-cycle = "1 s"
-max_inertia_ratio = 1e-9
-[load]
-inertia = {J}
-[controller]
-reference = {{ kind = "position", speed = {SPEED}, acceleration = {ACCELERATION}, moves = {moves} }}
-[motor]
-from = "maxon-ec-i-52-606793"
-[gearbox]
-from = "bonfiglioli-tr060-2-36"
-[[vary]]
-key = "gearbox.ratio"
-values = [{ratios}]
+        f"""
+task = {{ cycle = "1 s", max_inertia_ratio = 1e-9 }}
+load.inertia = {J}
+controller.reference = {{ kind = "position", speed = {SPEED}, acceleration = {ACCELERATION}, moves = {moves} }}
+motor.from = "maxon-ec-i-52-606793"
+gearbox.from = "bonfiglioli-tr060-2-36"
+vary = [{{ key = "gearbox.ratio", values = [{ratios}] }}]
 """
     )
     directory = tmp_path / "rows"
@@ -145,18 +125,13 @@ def motor_torques() -> list[float]:
     return [MOTOR.friction_torque + T / (RATIO * EFFICIENCY) + sign * own for (_, _, T), sign in zip(phases(), (1, 0, -1), strict=True)]
 
 
-def test_rms_torque_of_trapezoidal_moves(demand: Any):
-    by_hand = math.sqrt(2 * sum(t * T**2 for (t, _, _), T in zip(phases(), motor_torques(), strict=True)) / CYCLE)
-    found = demand.cycle(demand.motor_torque(MOTOR)).rms_motor_torque
-    assert found == pytest.approx(by_hand, rel=1e-7)
-
-
-def test_cubic_mean_of_trapezoidal_moves(demand: Any):
+def test_rms_torque_and_cubic_mean_of_trapezoidal_moves(demand: Any):
+    rms = math.sqrt(2 * sum(t * T**2 for (t, _, _), T in zip(phases(), motor_torques(), strict=True)) / CYCLE)
     turned = sum(t * w for t, w, _ in phases())
-    by_hand = (sum(t * w * abs(T) ** 3 for t, w, T in phases()) / turned) ** (1 / 3)
+    mean = (sum(t * w * abs(T) ** 3 for t, w, T in phases()) / turned) ** (1 / 3)
     cycle: DutyCycle = demand.cycle(demand.motor_torque(MOTOR))
-    assert cycle.mean_output_torque == pytest.approx(by_hand, rel=1e-7)
-    assert cycle.mean_input_speed == pytest.approx(2 * RATIO * DISTANCE / CYCLE, rel=1e-7)
+    found = (cycle.rms_motor_torque, cycle.mean_output_torque, cycle.mean_input_speed)
+    assert found == pytest.approx((rms, mean, 2 * RATIO * DISTANCE / CYCLE), rel=1e-7)
 
 
 def test_peak_current_voltage_and_inertia_ratio(demand: Any):
@@ -222,16 +197,12 @@ def test_a_cycle_repeats_exactly():
         once = reference.at(time)[derivative]
         for k in range(3):
             assert three.at(time + k * CYCLE)[derivative] == pytest.approx(once, abs=1e-9)
-
-
-def test_an_indexing_table_goes_on():
-    reference = lm.PositionReference(speed=4.0, acceleration=40.0, moves=[{"to": 1.5}])
-    assert repeated(reference, CYCLE, 4).at(3.99)[0] == pytest.approx(6.0)
-
-
-def test_samples_repeat():
-    reference = lm.PositionReference(samples={"times": [0.0, 0.5, 1.0], "values": [0.0, 1.0, 0.0]})
-    assert repeated(reference, 1.0, 2).at([0.25, 1.25, 1.75])[0] == pytest.approx([0.5, 0.5, 0.5])
+    indexing = lm.PositionReference(speed=4.0, acceleration=40.0, moves=[{"to": 1.5}])  # goes on
+    assert repeated(indexing, CYCLE, 4).at(3.99)[0] == pytest.approx(6.0)
+    samples = lm.PositionReference(samples={"times": [0.0, 0.5, 1.0], "values": [0.0, 1.0, 0.0]})
+    assert repeated(samples, 1.0, 2).at([0.25, 1.25, 1.75])[0] == pytest.approx([0.5, 0.5, 0.5])
+    instants = np.linspace(0.0, 3.0, 31)  # the last cycle has both of its ends
+    assert list(instants[last_cycle(len(instants), 3)][[0, -1]]) == pytest.approx([2.0, 3.0])
 
 
 # --- rows ---
@@ -377,11 +348,6 @@ def test_rows_are_kept_and_the_best_come_first(task: Study, result: Any, tmp_pat
     assert set(COLUMNS) <= set(result.data_vars)
 
 
-def test_the_last_cycle_has_both_of_its_ends():
-    time = np.linspace(0.0, 3.0, 31)
-    assert list(time[last_cycle(len(time), 3)][[0, -1]]) == pytest.approx([2.0, 3.0])
-
-
 # --- what is refused ---
 
 
@@ -407,11 +373,8 @@ def test_the_last_cycle_has_both_of_its_ends():
         ({"select": 3}, "key select"),
     ],
 )
-def test_bad_tasks_are_refused_in_one_line(change: dict[str, Any], says: str):
+def test_bad_tasks_are_refused_in_one_line(change: dict[str, Any], says: str, tmp_path: Path):
     refused(lambda: task_of(changed(**change)), match=says)
-
-
-def test_a_file_is_named(tmp_path: Path):
     (tmp_path / "task.toml").write_text('[task]\ncycle = "1 m"\n[load]\n[controller]\n')
     refused(lambda: lm.studies.load_task(tmp_path / "task.toml"), match=r"task.toml: .*cycle")
 

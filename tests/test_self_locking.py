@@ -1,10 +1,7 @@
 """What is said of self-locking gears before a run is what the exact solver then does."""
 
-from __future__ import annotations
-
 import math
 import re
-import sys
 from typing import Any
 
 import numpy as np
@@ -322,20 +319,10 @@ def test_explain_says_that_a_gearbox_locks():
     assert "gearbox: self-locking: holds its load at rest and stops it in motion" in text
     assert "lowering 30 N·m takes more than" in text
     assert "self-locking" not in str(lm.explain(lm.load("paper-2dof-nl-small"), 0.5))
-
-
-def test_of_a_train_the_gear_that_locks_is_named_and_no_other():
-    text = str(lm.explain(lm.load("worm-lowering"), 0.05))
-    assert "worm_gear: self-locking: holds its load at rest and stops it in motion" in text
-    assert "lowering 20 N·m takes more than 0.09003 N·m of motor; chatters" in text
-    assert "coupling: not self-locking" not in text
-
-
-def test_a_gear_that_is_not_there_is_refused():
-    train = lm.load("worm-lowering").train()
-    assert "worm_gaer is no gear of this train; did you mean" in refused(lambda: lm.sizing.self_locking(train, "worm_gaer", 20.0))
-    assert "key gears.worm_gear: load_torque is missing, and the gear has" in refused(lambda: lm.sizing.self_locking(train, "worm_gear"))
-    assert "0 N·m drives nothing" in refused(lambda: lm.sizing.self_locking(train, "worm_gear", 0.0))
+    of_train = str(lm.explain(lm.load("worm-lowering"), 0.05))
+    assert "worm_gear: self-locking: holds its load at rest and stops it in motion" in of_train
+    assert "lowering 20 N·m takes more than 0.09003 N·m of motor; chatters" in of_train
+    assert "coupling: not self-locking" not in of_train
 
 
 # --- at rest, and at the start ---
@@ -349,10 +336,7 @@ def test_the_torque_that_a_stuck_shaft_holds_is_shared_by_bearing_and_gear_as_th
     gear = 1.2 * LOAD / RATIO
     assert run["worm_contact"].values == pytest.approx(0.0)
     assert run["gear_input_torque"].values == pytest.approx(LOAD / RATIO + held * gear / (gear + 0.12), rel=1e-12)
-
-
-def test_a_drive_as_a_train_has_the_same_input_torque_at_rest():
-    drive = lm.load("paper-2dof-nl-small")
+    drive = lm.load("paper-2dof-nl-small")  # as a train it has the same torque at rest
     short, long = lm.simulate(drive), lm.simulate(drive.long())
     stuck = short["input_contact"].values == 0.0
     assert stuck.sum() > 100
@@ -383,18 +367,18 @@ def test_speeds_that_contradict_each_other_are_refused(speeds: dict[str, float],
 PAGE = (ROOT / "docs" / "self-locking.md").read_text()
 
 
-def test_the_page_shows_what_is_printed():
-    shown = re.search(r"```text\n(.*?)\n```", PAGE, re.S)
-    assert shown is not None
-    assert str(lm.sizing.self_locking(lm.load("worm-lowering").train(), "worm_gear", 20.0)) == shown.group(1)
+def test_the_page_shows_what_is_printed_and_its_table_every_worm_gear(monkeypatch: pytest.MonkeyPatch):
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    import self_locking_figures
 
-
-def test_the_table_of_the_page_has_every_worm_gear_and_what_is_said_below_it():
-    sys.path.insert(0, str(ROOT / "docs"))
-    try:
-        import self_locking_figures
-    finally:
-        sys.path.pop(0)
+    train = lm.load("worm-lowering").train()
+    assert str(lm.sizing.self_locking(train, "worm_gear", 20.0)) == re.findall(r"```text\n(.*?)\n```", PAGE, re.S)[0]
+    for name, load, text in (
+        ("worm_gaer", 20.0, "worm_gaer is no gear of this train; did you mean"),
+        ("worm_gear", None, "key gears.worm_gear: load_torque is missing, and the gear has"),
+        ("worm_gear", 0.0, "0 N·m drives nothing"),
+    ):
+        refused(lambda n=name, load=load: lm.sizing.self_locking(train, n, load), match=text)
     rows = [line.strip("| ").split(" | ") for line in self_locking_figures.worm_table().splitlines()[2:]]
     assert [row[0].strip("`") for row in rows] == WORMS
     for row in rows:

@@ -1,7 +1,5 @@
 """Derivatives of runs with respect to values of their scenarios: closed forms, differences of the runs themselves, refusals."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Sensitivities of coupled links with friction and stops: against differences of runs, and their own laws."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -14,7 +14,7 @@ from conftest import ROOT, lostmotion
 from html_pages import charts
 from lostmotion.control.gain_rules import TwoInertias, identical_damping, identical_radius, identical_real_part, symmetrical_optimum
 from lostmotion.reports.servo import servo_report
-from lostmotion.servo.linear_regimes import Axis, axis_of, regimes
+from lostmotion.servo.linear_regimes import axis_of, regimes
 from lostmotion.servo.linear_sampled_loop import LinearLoop
 from lostmotion.servo.margins import bandwidth_of, frequencies, margins
 from lostmotion.servo.tuning_data import lag_sum, two_inertias
@@ -33,14 +33,24 @@ def motor_speed_over_torque() -> Any:
     return control.ss(A, B, [[0, 0, 0, 1.0]], 0)
 
 
+def amplitude_of(run: Any, name: str, f: float, begin: float) -> complex:
+    """Of a sine in a run after its transient, by least squares over whole periods."""
+    last = run["time"].to_numpy() >= begin - 0.1 * T
+    t, y = run["time"].to_numpy()[last][:-1], run[name].to_numpy()[last][:-1]
+    basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t), np.ones_like(t)])
+    (a, b, _), *_ = np.linalg.lstsq(basis, y, rcond=None)
+    return complex(a, b)
+
+
 # --- margins ---
 
 
-def margins_by_python_control(loop: Any, sample_time: float) -> tuple[float, float, float, float]:
-    """Gain margin, phase margin [deg] and their frequencies, on a dense grid between whose points it interpolates."""
+def assert_margins_by_python_control(found: Any, loop: Any, sample_time: float, within: float) -> None:
+    """Gain margin, phase margin and their frequencies, on a dense grid between whose points python-control interpolates."""
     w = np.geomspace(1e-3, 1.0, 4000, endpoint=False) * math.pi / sample_time
     gain, phase, _, at_gain, at_phase, _ = control.stability_margins(control.frd(loop, w))
-    return gain, phase, at_gain, at_phase
+    theirs = (gain, math.radians(phase), at_gain / (2.0 * math.pi), at_phase / (2.0 * math.pi))
+    assert (found.gain_margin, found.phase_margin, found.gain_margin_frequency, found.crossover) == pytest.approx(theirs, rel=within)
 
 
 def test_margins_of_the_sampled_speed_loop_are_those_of_python_control() -> None:
@@ -52,12 +62,8 @@ def test_margins_of_the_sampled_speed_loop_are_those_of_python_control() -> None
     a = math.exp(-T / tau)
     estimate = (z - 1) / (T * z) * (1 - a) * z / (z - a)
     loop = control.c2d(motor_speed_over_torque(), T, "zoh") * (1 / z) * estimate * (k_p + k_i * T / (z - 1))
-    gain, phase, at_gain, at_phase = margins_by_python_control(loop, T)
     assert found.stable
-    assert found.gain_margin == pytest.approx(gain, rel=1e-6)
-    assert found.gain_margin_frequency == pytest.approx(at_gain / (2.0 * math.pi), rel=1e-6)
-    assert math.degrees(found.phase_margin) == pytest.approx(phase, rel=1e-6)
-    assert found.crossover == pytest.approx(at_phase / (2.0 * math.pi), rel=1e-6)
+    assert_margins_by_python_control(found, loop, T, 1e-6)
     w = 2.0 * math.pi * np.geomspace(1.0, 3900.0, 50_000)
     L = np.ravel(loop(np.exp(1j * w * T)))
     assert found.sensitivity_peak == pytest.approx(np.abs(1.0 / (1.0 + L)).max(), rel=1e-6)
@@ -75,11 +81,7 @@ def test_margins_of_a_position_loop_that_is_slower_are_those_of_python_control()
     B = np.array([0, 0, 0, 0, k_p])
     slow = sum(np.linalg.matrix_power(A, j) @ B for j in range(n))
     loop = K_v * control.ss(np.linalg.matrix_power(A, n), slow[:, None], [[0, 0, 0, 1.0, 0]], 0, n * T)
-    gain, phase, at_gain, at_phase = margins_by_python_control(loop, n * T)
-    assert found.gain_margin == pytest.approx(gain, rel=1e-5)
-    assert found.gain_margin_frequency == pytest.approx(at_gain / (2.0 * math.pi), rel=1e-5)
-    assert math.degrees(found.phase_margin) == pytest.approx(phase, rel=1e-5)
-    assert found.crossover == pytest.approx(at_phase / (2.0 * math.pi), rel=1e-5)
+    assert_margins_by_python_control(found, loop, n * T, 1e-5)
 
 
 def current_axis() -> lm.Scenario:
@@ -130,7 +132,7 @@ def test_the_proportional_speed_loop_of_a_rigid_drive_is_stable_up_to_its_closed
 
 
 def test_the_closed_loop_answers_a_sine_as_the_simulator_does() -> None:
-    """Gain and phase of a run after its transient, by least squares over whole periods; feedforward, weight and filters are in."""
+    """Feedforward, weight and filters are in."""
     f = 20.0
     speed = {
         "gain": 1.1, "integral_gain": 45.0, "reference_weight": 0.7,
@@ -147,11 +149,7 @@ def test_the_closed_loop_answers_a_sine_as_the_simulator_does() -> None:
     }
     scenario = two_mass(speed, **wave, **more)
     run = lm.simulate(scenario, duration=3.0, sample_interval=4 * T)
-    last = run["time"].to_numpy() >= 2.0 - 0.1 * T
-    t, y = run["time"].to_numpy()[last][:-1], run["m_measured_position"].to_numpy()[last][:-1]
-    basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t), np.ones_like(t)])
-    (a, b, _), *_ = np.linalg.lstsq(basis, y, rcond=None)
-    expected = complex(a, b) / 0.02
+    expected = amplitude_of(run, "m_measured_position", f, 2.0) / 0.02
     assert abs(expected) > 0.3
     found = sampled(scenario, "position", False).response(f)[0]
     assert abs(found - expected) < 1e-9 * abs(expected)
@@ -163,13 +161,9 @@ def test_stiffness_is_that_of_a_run_under_a_sine_of_load_torque() -> None:
         {"gain": 1.1, "integral_gain": 45.0}, reference={"kind": "position", "mean": 0.0}, position={"gain": 30.0, "sample_time": 4 * T}
     )
     loaded = scenario.replace(**{"shafts.load.torque": {"amplitude": 0.5, "frequency": f}})
-    run = lm.simulate(loaded, duration=2.0, sample_interval=4 * T)
-    last = run["time"].to_numpy() >= 1.0 - 0.1 * T
-    t, y = run["time"].to_numpy()[last][:-1], run["load_angle"].to_numpy()[last][:-1]
-    basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t), np.ones_like(t)])
-    (a, b, _), *_ = np.linalg.lstsq(basis, y, rcond=None)
+    expected = amplitude_of(lm.simulate(loaded, duration=2.0, sample_interval=4 * T), "load_angle", f, 1.0) / 0.5
     found = sampled(scenario, "position", False).compliance(f, "load", "load")[0]
-    assert abs(found - complex(a, b) / 0.5) < 1e-8 * abs(found)
+    assert abs(found - expected) < 1e-8 * abs(found)
 
 
 @pytest.mark.parametrize("ratio", [1.0, 40.0])
@@ -228,17 +222,6 @@ def test_the_symmetrical_optimum_has_its_phase_margin() -> None:
     assert at == pytest.approx(0.5 / lag, rel=1e-9)
     assert math.radians(phase) == pytest.approx(math.atan(2.0) - math.atan(0.5), rel=1e-9)
     assert gains.filter_time == 4.0 * lag
-
-
-@pytest.mark.parametrize(
-    ("rule", "text"),
-    [
-        (lambda d: identical_damping(d, 0.7), "at least 1.96, and it is 1; take damping = 0.5 or less"),
-        (lambda d: identical_real_part(d, 0.7), "from 1.96 to 2.748, and it is 1"),
-    ],
-)
-def test_what_a_rule_cannot_do_is_refused(rule: Any, text: str) -> None:
-    refused(lambda: rule(TwoInertias(1.0, 1.0, 1.0)), match=text)
 
 
 def test_the_sum_of_the_lags_is_the_slope_of_the_phase() -> None:
@@ -336,29 +319,35 @@ def test_gains_that_are_to_be_found_may_be_missing(tmp_path: Any) -> None:
     assert lm.load(bare) == tuned.scenario
 
 
-@pytest.mark.parametrize(
-    ("rule", "given", "key"),
-    [
-        ("suited", {"phase_margin": 1.0}, "phase_margin"),
-        ("margins", {"damping": 0.7}, "damping"),
-        ("margins", {"gain_margin": 0.5}, "gain_margin"),
-        ("margins", {"bandwidth": -1.0}, "bandwidth"),
-        ("search", {"goal": "speed"}, "goal"),
-        ("search", {"bandwidth": "3 Hz"}, "bandwidth"),
-    ],
-)
-def test_a_rule_refuses_what_it_does_not_take(position_axis: Any, rule: str, given: dict[str, Any], key: str) -> None:
-    refused(lambda: lm.tune(position_axis, rule=rule, **given), key)
-
-
-def test_the_gains_of_a_formula_say_what_margins_they_leave() -> None:
-    assert "unstable (position loop, stiffness)" in lm.tune(lm.load("ball-screw-axis"), rule="suited").why
-
-
-def test_tuning_refuses_what_it_cannot_do(position_axis: Any) -> None:
-    assert 'rule: "best" is not known; take one of suited, symm' in refused(lambda: lm.tune(position_axis, rule="best"))
-    assert "identical radius needs an inertia ratio of load to motor" in refused(lambda: lm.tune(position_axis, rule="identical_radius"))
-    assert "the scenario has no sampled controller; add a" in refused(lambda: lm.tune(lm.load("paper-2dof-nl-large")))
+def test_a_rule_refuses_what_it_does_not_take_or_cannot_do(position_axis: Any, tmp_path: Any) -> None:
+    for rule, key, value in (
+        ("suited", "phase_margin", 1.0),
+        ("margins", "damping", 0.7),
+        ("margins", "gain_margin", 0.5),
+        ("margins", "bandwidth", -1.0),
+        ("search", "goal", "speed"),
+        ("search", "bandwidth", "3 Hz"),
+    ):
+        refused(lambda rule=rule, key=key, value=value: lm.tune(position_axis, rule=rule, **{key: value}), key)
+    one = TwoInertias(1.0, 1.0, 1.0)
+    uneven = two_mass(
+        {"gain": 1.1, "sample_time": 2 * T}, position={"gain": 30.0, "sample_time": 3 * T}, reference={"kind": "position", "mean": 0.0}
+    )
+    tuned = lm.tune(position_axis, rule="suited")
+    for call, text in (
+        (lambda: identical_damping(one, 0.7), "at least 1.96, and it is 1; take damping = 0.5 or less"),
+        (lambda: identical_real_part(one, 0.7), "from 1.96 to 2.748, and it is 1"),
+        (lambda: lm.tune(position_axis, rule="best"), 'rule: "best" is not known; take one of suited, symm'),
+        (lambda: lm.tune(position_axis, rule="identical_radius"), "identical radius needs an inertia ratio of load to motor"),
+        (lambda: lm.tune(lm.load("paper-2dof-nl-large")), "the scenario has no sampled controller; add a"),
+        (lambda: sampled(uneven, "position", True), "position.sample_time: 3 ticks are no whole multiple of the 2 of the"),
+        (lambda: axis_of(two_mass({"gain": 1.0}), "x"), 'motor: "x" has no controller; those that have are m'),
+        (lambda: tuned.write(tmp_path / "tuned.txt", "position-axis"), "must end in .toml"),
+        (lambda: tuned.write(tmp_path / "none" / "tuned.toml", "position-axis"), "its directory does not exist"),
+    ):
+        refused(call, match=text)
+    assert list(tmp_path.iterdir()) == []
+    assert "unstable (position loop, stiffness)" in lm.tune(lm.load("ball-screw-axis"), rule="suited").why  # a formula says what it leaves
 
 
 def test_the_sheet_of_the_shipped_axis(position_axis: Any, sheet: Any) -> None:
@@ -401,18 +390,6 @@ def test_backlash_is_found_as_the_cause_of_a_limit_cycle() -> None:
     assert double is not None
     assert double.whole.frequency == pytest.approx(cycle.whole.frequency, rel=0.02)
     assert double.whole.motor_amplitude == pytest.approx(2.0 * cycle.whole.motor_amplitude, rel=0.02)
-
-
-def test_loops_whose_sample_times_do_not_nest_are_refused() -> None:
-    scenario = two_mass(
-        {"gain": 1.1, "sample_time": 2 * T}, reference={"kind": "position", "mean": 0.0}, position={"gain": 30.0, "sample_time": 3 * T}
-    )
-    assert "position.sample_time: 3 ticks are no whole multiple of the 2 of the" in refused(lambda: sampled(scenario, "position", True))
-
-
-def test_an_axis_is_named_where_there_are_several() -> None:
-    assert isinstance(axis_of(two_mass({"gain": 1.0})), Axis)
-    assert 'motor: "x" has no controller; those that have are m' in refused(lambda: axis_of(two_mass({"gain": 1.0}), "x"))
 
 
 # --- the command ---
@@ -506,33 +483,22 @@ def test_a_tuned_file_keeps_comments_and_loads_to_the_tuned_scenario(tmp_path: A
     assert [p.name for p in target.parent.iterdir()] == ["tuned.toml"]
 
 
-def test_a_tuned_file_finds_the_files_that_its_source_names(tmp_path: Any) -> None:
+def test_a_tuned_file_finds_the_files_of_its_source_and_holds_results_and_changed_values(tmp_path: Any) -> None:
     (tmp_path / "drive.toml").write_text('base = "position-axis"\n')
-    source, target = tmp_path / "axis.toml", tmp_path / "kept" / "tuned.toml"
-    source.write_text('base = "drive.toml"\n')
-    target.parent.mkdir()
-    tuned = lm.tune(lm.load(source), rule="suited")
-    tuned.write(target, source)
-    assert 'base = "../drive.toml"' in target.read_text()
-    assert lm.load(target) == tuned.scenario
-
-
-def test_a_saved_result_and_changed_values_give_a_file_of_the_whole_scenario(tmp_path: Any) -> None:
+    (tmp_path / "axis.toml").write_text('base = "drive.toml"\n')
+    (tmp_path / "kept").mkdir()
     lm.save(lm.simulate(lm.load("speed-axis"), duration=0.01), tmp_path / "run.csv")
-    tuned = lm.tune(lm.load(tmp_path / "run.csv"), rule="symmetrical_optimum")
-    tuned.write(tmp_path / "tuned.toml", tmp_path / "run.csv")
-    assert lm.load(tmp_path / "tuned.toml") == tuned.scenario
     changes = ["controller.position.gain=7", 'motor.voltage_limit="30 V"', "controller.reference.moves.0.to=0.5"]
-    tuned = lm.tune(lm.load("position-axis", changes), rule="suited")
-    tuned.write(tmp_path / "tuned.toml", "position-axis", changes)
-    assert lm.load(tmp_path / "tuned.toml") == tuned.scenario
-
-
-def test_a_file_that_cannot_be_written_leaves_nothing_behind(position_axis: Any, tmp_path: Any) -> None:
-    tuned = lm.tune(position_axis, rule="suited")
-    assert "must end in .toml" in refused(lambda: tuned.write(tmp_path / "tuned.txt", "position-axis"))
-    assert "its directory does not exist" in refused(lambda: tuned.write(tmp_path / "none" / "tuned.toml", "position-axis"))
-    assert list(tmp_path.iterdir()) == []
+    target = tmp_path / "kept" / "tuned.toml"
+    for source, rule, changed in (
+        (tmp_path / "axis.toml", "suited", []),
+        (tmp_path / "run.csv", "symmetrical_optimum", []),
+        ("position-axis", "suited", changes),
+    ):
+        tuned = lm.tune(lm.load(source, changed), rule=rule)
+        tuned.write(target, source, changed)
+        assert lm.load(target) == tuned.scenario
+        assert ('base = "../drive.toml"' in target.read_text()) == (source == tmp_path / "axis.toml")
 
 
 def test_the_command_keeps_gains_and_the_file_gives_the_same_verdict(tmp_path: Any) -> None:

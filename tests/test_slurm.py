@@ -1,7 +1,5 @@
 """The recipe for SLURM of docs/studies.md: its jobs as they would be submitted, and run by a stand-in for SLURM on this machine."""
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,7 +1,5 @@
 """Spectrum of periodic errors: orders and amplitudes of the errors that were put in."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

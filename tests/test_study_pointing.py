@@ -1,7 +1,5 @@
 """Studies of axes that follow a target: rows are those of single runs, whoever makes them, noise included."""
 
-from __future__ import annotations
-
 from concurrent.futures import ProcessPoolExecutor
 from pathlib import Path
 from typing import Any

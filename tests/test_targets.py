@@ -1,7 +1,5 @@
 """Targets in space as references: closed forms, differences, and what is refused."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Keys of tasks: each is judged, named as not judged, or refused, for every form of task; and any key with a number varies."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any
@@ -20,20 +18,9 @@ from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study_files import from_json, to_json
 from refusals import refused
 
-MOTOR: dict[str, Any] = {
-    "kind": "torque_source",
-    "rotor_inertia": "3e-4 kg m^2",
-    "rated_torque": "5 N m",
-    "limits": {
-        "continuous_torque": "5 N m",
-        "peak_torque": "25 N m",
-        "max_speed": "4000 rpm",
-        "resistance": "1 ohm",
-        "torque_constant": "0.5 N m/A",
-        "max_voltage": "400 V",
-        "max_current": "60 A",
-    },
-}
+LIMITS = {"continuous_torque": "5 N m", "peak_torque": "25 N m", "max_speed": "4000 rpm", "resistance": "1 ohm"}
+LIMITS |= {"torque_constant": "0.5 N m/A", "max_voltage": "400 V", "max_current": "60 A"}
+MOTOR: dict[str, Any] = {"kind": "torque_source", "rotor_inertia": "3e-4 kg m^2", "rated_torque": "5 N m", "limits": LIMITS}
 GEARBOX: dict[str, Any] = {
     "ratio": 2,
     "inertia": "4e-5 kg m^2",
@@ -55,18 +42,16 @@ SLIDE: dict[str, Any] = {
 SCREW = {"lead": "10 mm", "inertia": "1e-4 kg m^2", "efficiency": 0.9, "stiffness": "200 N/um", "damping": "40 kN s/m"}
 RACK = {"module": "2 mm", "teeth": 20, "stiffness": "50 N/um", "damping": "20 kN s/m"}
 BELT = {"teeth": 20, "pitch": "5 mm", "stiffness": "5 N/um", "damping": "10 kN s/m"}
+TURNS = [{"to": "2 rad", "dwell": "0.3 s"}, {"to": "0 rad"}]
+
+
 FORMS: dict[str, dict[str, Any]] = {
     "gearbox": {
         "task": SLIDE["task"],
         "load": {"inertia": "0.02 kg m^2", "friction_torque": "0.1 N m"},
         "controller": {
             "encoder": {"bits": 20},
-            "reference": {
-                "kind": "position",
-                "speed": "10 rad/s",
-                "acceleration": "100 rad/s^2",
-                "moves": [{"to": "2 rad", "dwell": "0.3 s"}, {"to": "0 rad"}],
-            },
+            "reference": {"kind": "position", "speed": "10 rad/s", "acceleration": "100 rad/s^2", "moves": TURNS},
         },
         "motor": MOTOR,
         "gearbox": GEARBOX,
@@ -116,7 +101,6 @@ ELSEWHERE = {  # each has a test of its own; linear, current, whole and pairs ar
     "cycle", "hold_without_power", "max_cycles", "settling_window", "altitude", "gravity", "payload",
     "process", "linear", "current", "whole", "pairs", "microsteps", "steppers",
 }  # fmt: skip
-OF_ANGLES = {"max_lost_motion": "1 um", "emergency_stop": "5 m/s^2"}
 
 
 @pytest.fixture(autouse=True)
@@ -130,9 +114,15 @@ def changed(form: str, **changes: Any) -> dict[str, Any]:
     return {**tables, **{key: tables[key] | value for key, value in changes.items()}}
 
 
+def findings_of(tables: dict[str, Any], rule: str | None = None) -> Any:
+    """Findings of the first pair of a task: all, or those of a rule."""
+    study = task_of(tables)
+    found = Axes(study).judged(study.parameters(0, 1)[0])
+    return found if rule is None else [f for f in found if f.rule == rule]
+
+
 def judged(form: str, **task: Any) -> list[Any] | lm.InputError:
-    study = task_of(changed(form, task=task))
-    return Axes(study).judged(study.parameters(0, 1)[0])
+    return findings_of(changed(form, task=task))
 
 
 def texts(findings: list[Any] | lm.InputError) -> set[tuple[str, ...]]:
@@ -146,6 +136,12 @@ def found_of(findings: list[Any], rule: str) -> Any:
 
 def test_every_key_of_a_task_is_covered_here() -> None:
     assert set(AxisTask.model_fields) == {*RULE_OF, *COLUMN_OF, *ELSEWHERE}
+    assert set(Task.model_fields) == {*OF_SCENARIOS, "cycle"}
+    of_keys = {rule for _, rules in RULE_OF.values() for rule in rules.split()}
+    assert of_keys & set(TASK_RULES) == of_keys - {"lost_motion", "inertia_ratio", "holding", "winding_temperature"}
+    for key in set(Supply.model_fields) - {"min_voltage", "returns_to_mains"}:
+        value = {"voltage_limit": "400 V", "max_voltage": "320 V", "capacitance": "1 mF"}.get(key, 10.0)
+        assert texts(judged("screw", supply={key: value})) - texts(judged("screw")), key
 
 
 @pytest.mark.parametrize("form", FORMS)
@@ -179,12 +175,6 @@ def test_a_key_of_the_run_limits_a_column(key: str, form: str) -> None:
     assert COLUMN_OF[key] in study.select.limits
 
 
-@pytest.mark.parametrize("key", [key for key in Supply.model_fields if key not in ("min_voltage", "returns_to_mains")])
-def test_a_key_of_the_supply_is_judged_or_named(key: str) -> None:
-    value = {"voltage_limit": "400 V", "max_voltage": "320 V", "capacitance": "1 mF"}.get(key, 10.0)
-    assert texts(judged("screw", supply={key: value})) - texts(judged("screw"))
-
-
 def test_the_force_of_an_emergency_stop() -> None:
     """|m g sin + m a| of a vertical slide that comes down, with the ratings of the screw, the rack, the belt and the linear motor."""
     force = 100.0 * (G + 5.0)
@@ -196,12 +186,11 @@ def test_the_force_of_an_emergency_stop() -> None:
     for form, (ratings, limit) in given.items():
         table = form.split()[0]
         tables = changed(form, task={"emergency_stop": "5 m/s^2"}, slide={"inclination": "90 deg"}, **{table: ratings})
-        study = task_of(tables)
-        found = [f for f in Axes(study).judged(study.parameters(0, 1)[0]) if f.rule == "emergency_stop" and f.use]
+        found = [f for f in findings_of(tables, "emergency_stop") if f.use]
         right = force + 1e3 if table == "belt" else force
         assert limit * found[-1].use == pytest.approx(right, rel=1e-9), form
-    study = task_of(changed("linear motor", task={"emergency_stop": "5 m/s^2"}, slide={"inclination": "90 deg"}))
-    (found,) = [f for f in Axes(study).judged(study.parameters(0, 1)[0]) if f.rule == "emergency_stop"]
+    tables = changed("linear motor", task={"emergency_stop": "5 m/s^2"}, slide={"inclination": "90 deg"})
+    (found,) = findings_of(tables, "emergency_stop")
     assert 900.0 * found.use == pytest.approx(104.0 * (G + 5.0), rel=1e-9)
 
 
@@ -212,8 +201,7 @@ def test_the_inertia_ratio_has_all_that_is_not_the_rotor_and_the_limit_of_the_ma
 
     def found(limits: dict[str, Any], **task: Any) -> Any:
         tables = changed("screw behind gearbox", task={"brake": {"torque": 2.0, "inertia": 5e-5}, **task})
-        study = task_of({**tables, "motor": MOTOR | {"limits": MOTOR["limits"] | limits}})
-        (one,) = [f for f in Axes(study).judged(study.parameters(0, 1)[0]) if f.rule == "inertia_ratio"]
+        (one,) = findings_of({**tables, "motor": MOTOR | {"limits": MOTOR["limits"] | limits}}, "inertia_ratio")
         return one
 
     assert 10.0 * found({}).use == pytest.approx(right, rel=1e-9)
@@ -263,10 +251,6 @@ def test_a_key_of_the_task_of_a_scenario_is_judged_or_refused(key: str, form: st
     assert [f for f in lm.check_drive(scenario) if f.rule == rule]
 
 
-def test_every_key_of_the_task_of_a_scenario_is_covered_here() -> None:
-    assert set(Task.model_fields) == {*OF_SCENARIOS, "cycle"}
-
-
 @pytest.mark.parametrize("form", ["axis", "train"])
 @pytest.mark.parametrize("brake", [{"torque": 0.2}, {"force": 100.0}])
 def test_an_axis_is_judged_by_the_rules_of_drives(form: str, brake: dict[str, float]) -> None:
@@ -298,9 +282,7 @@ def test_a_fast_sine_between_the_samples_heats_the_motor() -> None:
 
 def test_lost_motion_without_a_gearbox_is_under_the_rated_torque_of_the_motor() -> None:
     """Backlash and what ±3 % of 5 N m through the screw deflect 200 N/um by."""
-    tables = changed("screw", task={"max_lost_motion": "20 um"}, screw={"backlash": "10 um"})
-    study = task_of(tables)
-    (found,) = [f for f in Axes(study).judged(study.parameters(0, 1)[0]) if f.rule == "lost_motion"]
+    (found,) = findings_of(changed("screw", task={"max_lost_motion": "20 um"}, screw={"backlash": "10 um"}), "lost_motion")
     force = 0.03 * 5.0 * 2.0 * math.pi / 0.01
     assert 20e-6 * found.use == pytest.approx(10e-6 + 2.0 * force / 200e6, rel=0.02)
 
@@ -400,8 +382,3 @@ def test_a_refused_pair_shows_what_its_motion_requires() -> None:
     assert float(pair["inertia_ratio"]) == pytest.approx((100.0 * s**2 + 1e-4) / 3e-4, rel=1e-9)
     assert float(pair["input_speed_peak"]) == pytest.approx(0.2 / s, rel=1e-9)
     assert np.isfinite(float(pair["motor_torque_rms"]))
-
-
-def test_the_rules_of_tasks_are_the_ones_that_keys_name() -> None:
-    of_keys = {rule for _, rules in RULE_OF.values() for rule in rules.split()}
-    assert of_keys & set(TASK_RULES) == of_keys - {"lost_motion", "inertia_ratio", "holding", "winding_temperature"}

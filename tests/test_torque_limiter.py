@@ -1,7 +1,5 @@
 """Torque limiters: release, slip, and where they engage again."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

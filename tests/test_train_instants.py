@@ -1,7 +1,5 @@
 """Drive trains step by step, as linear models, explained: against runs, textbook matrices and capacities by hand."""
 
-from __future__ import annotations
-
 import math
 import pickle
 from pathlib import Path

@@ -1,7 +1,5 @@
 """The laws of the elements of a drive train: both solvers on each, closed forms, what commands and errors may be."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

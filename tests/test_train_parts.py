@@ -1,7 +1,5 @@
 """Parts of a drive train that nothing joins are solved alone: the results of the whole are those that the whole solved at once has."""
 
-from __future__ import annotations
-
 import json
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Periodic motions and frequency responses of drive trains: closed forms, long transients, the classic drive."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from typing import Any

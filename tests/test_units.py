@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pint
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 import lostmotion as lm
@@ -275,50 +275,39 @@ def test_any_text_is_a_finite_number_or_a_sentence(text: str):
 
 
 @given(st.integers(-(10**6), 10**6), st.integers(-6, 6))
-def test_decimal_prefixes_keep_every_digit(digits: int, exponent: int):
+@example(3, -7)
+def test_decimal_prefixes_and_products_keep_every_digit(digits: int, exponent: int):
     assert to_si(f"{digits}e{exponent} ms", "s") == float(f"{digits}e{exponent - 3}")
+    assert (to_si("3 gcm2", "kg*m^2"), to_si("5 cSt", "m^2/s"), to_si("7 mN*mm", "N*m")) == (3e-7, 5e-6, 7e-6)
+    assert [practical(*x) for x in ((0.0755, "rad", 2), (12.555, "rad", 4), (1e-3, "rad", 2))] == [
+        "260 arcmin",
+        "43160 arcmin",
+        "3.4 arcmin",
+    ]
 
 
-@pytest.mark.parametrize(("text", "unit", "value"), [("3 gcm2", "kg*m^2", 3e-7), ("5 cSt", "m^2/s", 5e-6), ("7 mN*mm", "N*m", 7e-6)])
-def test_products_of_decimal_units_keep_every_digit(text: str, unit: str, value: float):
-    assert to_si(text, unit) == value
+ACCELERATIONS = {"rad/s^2": 3.0, "rad/s²": 3.0, "deg/s^2": 3 * DEG, "rev/s^2": 6 * math.pi, "rpm/s": 3 * RPM, "krpm/s": 3000 * RPM}
+ACCELERATIONS |= {"min-1/s": 3 * RPM, "rpm/ms": 3000 * RPM}
+JERKS = {"rad/s^3": 3.0, "deg/s³": 3 * DEG, "rev/s^3": 6 * math.pi, "rpm/s^2": 3 * RPM}
 
 
-@pytest.mark.parametrize(
-    ("text", "unit", "value"),
-    [
-        ("3 rad/s^2", "rad/s^2", 3.0),
-        ("3 rad/s²", "rad/s^2", 3.0),
-        ("3 deg/s^2", "rad/s^2", 3 * DEG),
-        ("3 rev/s^2", "rad/s^2", 6 * math.pi),
-        ("3 rpm/s", "rad/s^2", 3 * RPM),
-        ("3 krpm/s", "rad/s^2", 3000 * RPM),
-        ("3 min-1/s", "rad/s^2", 3 * RPM),
-        ("3 rpm/ms", "rad/s^2", 3000 * RPM),
-        ("3 rad/s^3", "rad/s^3", 3.0),
-        ("3 deg/s³", "rad/s^3", 3 * DEG),
-        ("3 rev/s^3", "rad/s^3", 6 * math.pi),
-        ("3 rpm/s^2", "rad/s^3", 3 * RPM),
-    ],
-)
-def test_accelerations_and_jerks_are_read_in_turns_degrees_and_radians(text: str, unit: str, value: float):
-    assert to_si(text, unit) == pytest.approx(value, rel=1e-14)
-
-
-@pytest.mark.parametrize(
-    ("text", "unit", "words"),
-    [
+def test_accelerations_and_jerks_are_read_in_turns_degrees_and_radians_and_not_without():
+    for unit, texts in (("rad/s^2", ACCELERATIONS), ("rad/s^3", JERKS)):
+        for text, value in texts.items():
+            assert to_si(f"3 {text}", unit) == pytest.approx(value, rel=1e-14)
+    for text, unit, words in (
         ("3 1/s^2", "rad/s^2", 'turns or radians; write "3 rev/s^2" or "3 rad/s^2"'),
         ("3 kHz/s", "rad/s^2", 'turns or radians; write "3000 rev/s^2" or "3000 rad/s^2"'),
         ("3 1/min^2", "rad/s^2", 'turns or radians; write "3 rev/min^2" or "3 rad/min^2"'),
         ("3 s^-3", "rad/s^3", 'turns or radians; write "3 rev/s^3" or "3 rad/s^3"'),
         ("3 rad/s^2", "rad/s^3", "something else"),
         ("3 m/s^2", "rad/s^2", "something else"),
-    ],
-)
-def test_accelerations_and_jerks_without_an_angle_are_refused(text: str, unit: str, words: str):
-    with pytest.raises(ValueError, match=re.escape(words)):
-        to_si(text, unit)
+    ):
+        with pytest.raises(ValueError, match=re.escape(words)):
+            to_si(text, unit)
+    for unit in ("kN^999999999999", "kN^200", "mm^999999999999", "mm^-200"):
+        with pytest.raises(ValueError, match="beyond the range of numbers"):
+            si_factor(unit)
 
 
 PINT = pint.UnitRegistry(non_int_type=Decimal)
@@ -355,12 +344,6 @@ def test_products_of_units_are_converted_as_by_pint():
             assert float(factor_of(units) / factor_of(wanted)) == float(factor), (units, unit)
 
 
-@pytest.mark.parametrize("unit", ["kN^999999999999", "kN^200", "mm^999999999999", "mm^-200"])
-def test_a_power_beyond_the_range_of_numbers_is_refused(unit: str):
-    with pytest.raises(ValueError, match="beyond the range of numbers"):
-        si_factor(unit)
-
-
 def test_every_symbol_is_a_unit_of_the_table_and_is_written_as_it_is_read():
     for symbol, units in symbols().items():
         assert read_unit(plain(symbol)) == units, symbol
@@ -376,16 +359,8 @@ def test_every_unit_of_the_schema_can_be_written():
             return own.union(*map(units, node.values()))
         return set().union(*map(units, node)) if isinstance(node, list) else set()
 
-    found = (
-        units(scenario)
-        | units(lm.data_sheets.GearboxSheet.model_json_schema())
-        | units(lm.data_sheets.MotorSheet.model_json_schema())
-        | units(lm.data_sheets.ScrewSheet.model_json_schema())
-        | units(lm.data_sheets.RackSheet.model_json_schema())
-        | units(lm.data_sheets.BeltSheet.model_json_schema())
-        | units(lm.data_sheets.LinearMotorSheet.model_json_schema())
-        | units(lm.PositionReference.model_json_schema())
-    )
+    sheets = [getattr(lm.data_sheets, f"{kind}Sheet") for kind in ("Gearbox", "Motor", "Screw", "Rack", "Belt", "LinearMotor")]
+    found = units(scenario).union(*(units(part.model_json_schema()) for part in (*sheets, lm.PositionReference)))
     assert {"rad/s^2", "rad/s^3"} <= found
     assert {"", "N*m", "rad/s", "Hz", "degC", "K/W", "m^2/s", "kg", "N*m*s^2/rad^2"} <= found
     for unit in found:
@@ -455,8 +430,3 @@ def test_scenarios_studies_sheets_overrides_and_constructors_read_alike(tmp_path
         lm.Gearbox(**(gearbox.model_dump() | {"rated_input_speed": text})).rated_input_speed,
     ):
         assert found == pytest.approx(value, rel=1e-14)
-
-
-@pytest.mark.parametrize(("radians", "digits", "text"), [(0.0755, 2, "260 arcmin"), (12.555, 4, "43160 arcmin"), (1e-3, 2, "3.4 arcmin")])
-def test_values_in_practical_units_have_no_exponent_below_a_million(radians: float, digits: int, text: str) -> None:
-    assert practical(radians, "rad", digits) == text

@@ -1,7 +1,5 @@
 """Temperature as a slow parameter: the two bodies against closed forms, what follows them, and the error of freezing."""
 
-from __future__ import annotations
-
 import json
 import math
 from typing import Any

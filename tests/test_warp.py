@@ -1,7 +1,5 @@
 """Drives as a kernel of Warp, on its CPU device: against the solver that steps one drive, in both precisions."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,7 +1,5 @@
 """Joints of MuJoCo Warp that are turned by drives, on the CPU: against exact arms, closed forms and linear algebra."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Wind as a torque: spectra and their integrals, what the samples have of them, and a load that is shaken by it."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

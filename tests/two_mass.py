@@ -1,7 +1,5 @@
 """The linear two-mass drive of the tests of controllers: its scenario, and its matrices from the differential equations."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

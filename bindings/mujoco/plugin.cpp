@@ -3,7 +3,7 @@
 //
 // The joint needs the inertia A that the drive has at the joint through closed meshes as its armature, since a plugin
 // cannot change the armature from step to step. The drives of a model are solved together: with the inertia matrix S of
-// the robot at their joints, the other joints free, and all forces f there but contacts, both at the begin of the step,
+// the robot at their joints, the other joints free, and all forces f there but contacts, both at the start of the step,
 //     S a = f + tau(a),
 // where tau is the mean torque of the drives over the step (joint_trains.hpp). With the forces F = tau + A a the
 // engine, which solves (S + A) a = f + F, finds the same acceleration; it is of first order, since S and f are
@@ -11,7 +11,7 @@
 // the engine has found: with a contact it is another one. Newton's method finds the load torque by its exact
 // derivative.
 //
-// plugin_state: the whole state of the train, then its load torque, and speed and angle of the joint at the begin of
+// plugin_state: the whole state of the train, then its load torque, and speed and angle of the joint at the start of
 // the step. The file: the description of a train with a load torque on the shaft of the joint alone, which starts with
 // the speeds at which this shaft has 1 rad/s, then A.
 #include <mujoco/mujoco.h>

@@ -70,7 +70,7 @@ class TorqueResponse final : public Observer<System> {
 
     bool wants_switching() const override { return true; }
     void switching(const SwitchingOf<System>& w) override {
-        if (!inputs_) return;  // at the begin of the step: nothing depends on the torque yet
+        if (!inputs_) return;  // at the start of the step: nothing depends on the torque yet
         ++segments_;
         const Regime &old = *regime_, &next = cache_->regime(w.after);
         inputs_->anchor_left(w.time);

@@ -25,7 +25,7 @@ class RobotStep {
         std::span<const double> force;  // all but those of drives and contacts
         std::span<const double> matrix;
         std::span<const std::int32_t> row_length, row_begin, column;
-        std::vector<double> damping;               // of each speed; the engine's own force has it at the begin
+        std::vector<double> damping;               // of each speed; the engine's own force has it at the start
         std::vector<std::size_t> trained, others;  // speeds of the joints that trains turn, and the others
         std::vector<std::size_t> place;            // among the positions, of each of the first
         // Among the positions, of each speed; empty: there are joints whose positions are no integrals of their speeds,

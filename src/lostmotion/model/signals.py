@@ -75,7 +75,7 @@ class Chirp(Part, Generic[V]):
     """
 
     amplitude: V  #: amplitude of the sine
-    begin_frequency: Annotated[Frequency, Positive]  #: frequency at its begin
+    begin_frequency: Annotated[Frequency, Positive]  #: frequency at its start
     end_frequency: Annotated[Frequency, Positive]  #: frequency at its end
     duration: Annotated[Time, Positive]  #: time from its begin to its end
     begin: Annotated[Time, NotNegative] = 0.0  #: instant at which it begins

@@ -53,7 +53,7 @@ def _range(pair: tuple[float, float], unit: str) -> str:
 
 
 def map_panel(certificate: HuntingCertificate) -> Panel | None:
-    """The error left by a slip over the error at its begin."""
+    """The error left by a slip over the error at its start."""
     found = certificate.map
     if found is None or not found.sizes["error"]:
         return None

@@ -107,7 +107,7 @@ def verdict(found: Verdict | tuple[str, ...]) -> str:
 
 
 def _sentence(text: str) -> str:
-    """Text with a capital at its begin; a name with underscores stays as it is."""
+    """Text with a capital at its start; a name with underscores stays as it is."""
     return text if isinstance(text, Html) or "_" in text.partition(" ")[0] else f"{text[:1].upper()}{text[1:]}"
 
 
