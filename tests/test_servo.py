@@ -292,6 +292,35 @@ def test_a_bandwidth_takes_no_more_gain_than_it_needs(position_axis: Any) -> Non
     refused(lambda: lm.tune(position_axis, rule="margins", bandwidth="45 Hz"), "bandwidth")
 
 
+@pytest.mark.parametrize("rule", ["margins", "identical_damping"])
+def test_dry_friction_of_the_load_takes_no_gain_from_the_position_loop(position_axis: Any, rule: str) -> None:
+    """Coulomb friction is a constant while the load moves: the linear models, and so the bandwidth that sets K_v, are the same.
+    While it sticks the load follows no reference, and the loop of the motor against the spring has no bandwidth."""
+    held = position_axis.replace(**{"load.friction_torque": 1.0})
+    assert any(not regime.load_moves for regime in regimes(axis_of(held)))
+    found, free = (lm.tune(scenario, rule=rule) for scenario in (held, position_axis))
+    assert (found.gain, found.position_gain) == (free.gain, free.position_gain)
+    wanted = lm.tune(held, rule="margins", bandwidth="3 Hz")
+    assert wanted.gain == pytest.approx(lm.tune(position_axis, rule="margins", bandwidth="3 Hz").gain, rel=1e-4)
+
+
+def test_the_names_of_tuned_gains_are_those_of_the_file_in_every_form() -> None:
+    for name in ("position-axis", "ball-screw-axis"):
+        assert "controller.position.gain" in [key for key, _, _ in lm.tune(lm.load(name), rule="suited").changes()]
+
+
+def test_a_move_beyond_an_end_stop_does_not_settle_and_the_stop_is_the_reason() -> None:
+    """The reference ends 25 mm beyond a stop whose spring of 5 kN/mm gives by a millimetre at most: no gain removes the rest."""
+    stops = {"lower": -0.005, "upper": 0.305, "stiffness": 5e6, "damping": 1e4}
+    moves = {"axis.slide.end_stops": stops, "controller.reference.moves": [{"to": 0.33}], "simulation.duration": 1.5}
+    report = lm.commission(lm.load("ball-screw-axis").replace(**moves))
+    move = report.worst_move
+    assert move is not None
+    assert move.state == "not settled"
+    assert 0.022 < abs(move.remaining) < 0.025
+    assert "end stop at 305 mm" in dict(report.summary())["settling"]
+
+
 def test_margins_that_no_gain_keeps_name_the_best_that_is_reached() -> None:
     """Of a pure inertia with PI of T_i = 4 J/K_p: K_p/J = c and K_i/J = c^2/4, so that |L| = 1 at w^2 = c^2 (1 + sqrt(5/4))/2
     and the phase margin without lags is arctan(4 w/c) = 76.36 degrees at most, whatever the gain; lags only take from it."""

@@ -227,7 +227,10 @@ class ServoReport:
             known = [row for row in self.loops if math.isfinite(getattr(row.margins, key))]
             if known:
                 row = min(known, key=lambda r: getattr(r.margins, key))
-                words.append(f"{what} {scale(getattr(row.margins, key)):.3g}{unit} ({row.loop} loop, {row.regime})")
+                alone = ", outer loops open" if "current" in row.loop else ""
+                words.append(
+                    f"{what} {scale(getattr(row.margins, key)):.3g}{unit} ({row.loop} loop, {row.regime}{alone})"
+                )
         return ", ".join(words)
 
     def _worst_settling(self) -> str:
@@ -237,7 +240,8 @@ class ServoReport:
         assert worst is not None
         if not worst.within:
             return f"{'not' if worst.state == 'not settled' else 'not decided whether'} {inside}: {self._why(worst)}"
-        return f"{inside} in at most {1e3 * worst.time:.4g} ms, {self._proof(self.settling[-1])}"
+        after = f"in at most {1e3 * worst.time:.4g} ms" if worst.time > 0.0 else "from the end of each move on"
+        return f"{inside} {after}, {self._proof(self.settling[-1])}"
 
     @property
     def worst_move(self) -> Settling | None:
@@ -272,6 +276,9 @@ class ServoReport:
         if self._swings(s) and s.last:
             return f"it still {swing}, {when}"
         text = f"{_shown(left, unit, 3)} left {when} (allowed {_shown(self.window, unit)})"
+        stop = self._stop_before(s.to)
+        if stop is not None:
+            return f"{text}, as the end stop at {self._place(stop)} is in the way; move within the stops"
         if self._swings(s):
             return f"{text}, and {swing}"
         if twist > 0.5 * left:
@@ -280,6 +287,15 @@ class ServoReport:
         if s.reason == "at rest":
             return f"{text}, which the loop does not remove; add an integral gain, or a finer encoder"
         return f"{text}; the loop is still removing it: raise K_v, or lengthen the dwell"
+
+    def _stop_before(self, target: float) -> float | None:
+        """The end stop of the reference's shaft that the load meets before a target [rad], of a slide [m]."""
+        assert self.moves is not None
+        axis = self.moves.axis
+        stops = axis.train.shafts[axis.shaft].end_stops
+        if stops is None or stops.lower <= target <= stops.upper:
+            return None
+        return stops.upper if target > stops.upper else stops.lower
 
     def _place(self, position: float) -> str:
         return f"{math.degrees(position):.5g} deg" if self.load_unit == "rad" else f"{1e3 * position:.5g} mm"

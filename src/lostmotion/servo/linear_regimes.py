@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 SLIP = (
     1e-6  # relative difference of the speeds at both ends of a gear with hysteresis, so that its twist does not stick
 )
+LOAD_STUCK = "load stuck"  # regime in which friction holds the load and the motor turns against the main gear
 BEYOND = 1.5  # times the last breakpoint: a twist in the last piece of a torsion curve
 
 
@@ -171,6 +172,11 @@ class Regime:
     winding: OrientedWinding | None = None
     """winding of a motor under field-oriented control, whose command is the torque of its currents"""
 
+    @property
+    def load_moves(self) -> bool:
+        """Whether the load can follow a reference: bandwidths belong to such regimes alone."""
+        return self.name != LOAD_STUCK
+
     @classmethod
     def of(cls, axis: Axis, name: str, meaning: str, model: LinearModel) -> Regime:
         """The regime with its transition over a base tick of the axis, by the matrix exponential."""
@@ -259,7 +265,7 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
             0.5 * (edges[first + 1] - edges[first]), 0.5 * train.shafts[output].friction_torque / slopes[first]
         )
         state = TrainInitial(speeds=held, twists=twists | {main: near})
-        yield "load stuck", f"{output} sticks, the motor turns", state, {train.variable(output, "contact"): 0}
+        yield LOAD_STUCK, f"{output} sticks, the motor turns", state, {train.variable(output, "contact"): 0}
 
 
 def _text(value: float, si: str) -> str:

@@ -405,11 +405,12 @@ def _judge(axis: Axis, points: list[Regime], goal: str, peak: float) -> tuple[fl
             if loop != outer:
                 continue
             if goal == "bandwidth":
-                values.append(bandwidth_of(f, closed.closed_loop).three_decibels)
+                if regime.load_moves:
+                    values += _three_decibels(closed, f)
             else:
                 most = float(np.abs(closed.compliance(f, axis.motor_shaft, axis.shaft)).max())
                 values.append(1.0 / most if most > 0.0 else math.inf)  # not where the load sticks
-    least = min(values)
+    least = min(values, default=0.5 / axis.controller.loop_time(outer))
     return (math.log(least) if least > 0.0 else -50.0), min(spare)
 
 
@@ -417,8 +418,22 @@ def _loops(axis: Axis, regime: Regime, loop: str) -> tuple[LinearLoop, LinearLoo
     return LinearLoop(axis, regime, loop, True), LinearLoop(axis, regime, loop, False)
 
 
+def _three_decibels(closed: LinearLoop, f: np.ndarray) -> list[float]:
+    """Bandwidth of a closed loop at -3 dB [Hz]; nothing where the measured value does not move, as behind an open gap."""
+    found = bandwidth_of(f, closed.closed_loop)
+    if found.resonance_peak == 0.0:
+        return []
+    if math.isnan(found.three_decibels):
+        below = abs(closed.closed_loop(f[:1])[0]) < math.sqrt(0.5)
+        return [float(f[0] if below else 0.5 / closed.sample_time)]
+    return [found.three_decibels]
+
+
 def _lowest_bandwidth(axis: Axis, loop: str) -> float:
-    """The lower of that at -3 dB and at -90 degrees, the lowest of all regimes [Hz].
+    """The lower of that at -3 dB and at -90 degrees, the lowest of all regimes in which the load moves [Hz].
+
+    While the load sticks, the speed loop turns the motor against the spring of the gear. The gain from its reference to the speed
+    is then K_i/(K_i + k/i^2) at low frequencies, which is no bandwidth.
 
     Raises InputError: the loop is unstable in a regime.
     """
@@ -430,6 +445,8 @@ def _lowest_bandwidth(axis: Axis, loop: str) -> float:
                 f"rule: its gains are unstable in the regime {regime.name}, where the exact sampled loop has delays and compliance that "
                 'the rule does not know; take rule = "margins"'
             )
+        if not regime.load_moves:
+            continue
         f = frequencies(closed)
         b = bandwidth_of(f, closed.closed_loop)
         found += [x for x in (b.three_decibels, b.ninety_degrees) if not math.isnan(x)]
@@ -489,7 +506,8 @@ def _tuning(
         axis = with_controller(axis, **_known(axis))
     controller = axis.controller.model_copy(update=_fields(axis, gains, K_v))
     changed = scenario.with_axes({axis.motor: controller})
-    where, before = scenario.controller_key(axis.motor), scenario.axes()[axis.motor]
+    where = scenario.key_in_file(scenario.controller_key(axis.motor))
+    before = scenario.axes()[axis.motor]
     changes = dict(differences(before.model_dump(), controller.model_dump(), where))
     constant = _torque_constant(axis)
     slides = axis.train.is_slide(axis.motor_shaft)
