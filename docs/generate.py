@@ -106,7 +106,7 @@ def write_table(
             default = f'"{node["const"]}"'
         meaning = (node.get("description") or (purpose_of(inner[0]) if inner else "")).replace("\n", " ")
         kind = "table" if inner else unit_of(node)
-        lines.append(f"| `{key}` | {kind} | {limits_of(node)} | {default} | {meaning} |")
+        lines.append(f"| `{key}` | {kind} | {limits_of(node)} | {default} | {meaning.replace('|', chr(92) + '|')} |")
         place = f"{key}.NAME" if has_elements(node) else key
         later += [(f"{title}.{place}" if title != "top level" else place, t) for t in inner]
     lines.append("")
@@ -222,7 +222,10 @@ def variables() -> str:
         "",
     ]
     lines += ["| variable | symbol | unit | meaning |", "|---|---|---|---|"]
-    lines += [f"| `{v.name}` | {v.symbol} | {v.unit.replace('*', '·')} | {v.meaning} |" for v in VARIABLES]
+    lines += [
+        f"| `{v.name}` | {v.symbol} | {v.unit.replace('*', '·')} | {v.meaning.replace('|', chr(92) + '|')} |"
+        for v in VARIABLES
+    ]
     lines += [
         "",
         "The variables of a [drive train](../drive-trains.md) are called after its elements:",

@@ -76,7 +76,9 @@ def test_without_any_rig_a_template_is_written_that_the_file_takes(logs: Path, t
         (folder / "log.csv").write_text("\n".join([f"time [s],pos [{unit}],torque [N*m]", *rows]))
         code, said = invoke("identify", "new", str(folder))
         assert code == 0, said
-        assert name in lm.load(folder / "rig.toml").to_json()
+        rig = lm.load(folder / "rig.toml")
+        assert bool(rig.slides) == (unit == "mm")
+        assert name in rig.train().shafts
         task = (folder / "identify.toml").read_text()
         assert 'scenario = "rig.toml"' in task
         assert "SHAFT" not in task and "SLIDE" not in task and "MOTOR" not in task

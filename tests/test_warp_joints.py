@@ -172,6 +172,19 @@ def test_worlds_have_parameters_of_their_own_and_begin_anew() -> None:
 FREE = PENDULUM.format(step=0.002, gravity=0.0)
 
 
+def test_a_load_torque_of_the_drive_gives_way_to_the_robot() -> None:
+    """With replace=True the drive moves as one without it; what is on the device already cannot be taken off the model."""
+    light = lm.load("paper-2dof-nl-small")
+    heavy = light.replace(**{"load.torque": {"mean": 1.0}})
+    found = [Robot(FREE, {"j": one}, replace=True) for one in (light, heavy)]
+    for robot in found:
+        robot.run(lambda _: {"j": 0.5}, 0.02)
+    assert found[0].d.qpos.numpy().tolist() == found[1].d.qpos.numpy().tolist() != [[0.0]] * WORLDS
+    assert "load.torque: would count twice" in refused(lambda: Robot(FREE, {"j": heavy}))
+    armed = FREE.replace('name="j"', 'name="j" armature="0.1"')
+    assert "before put_model" in refused(lambda: Robot(armed, {"j": light}, replace=True))
+
+
 @pytest.mark.parametrize(
     ("use", "message"),
     [

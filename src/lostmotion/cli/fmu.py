@@ -85,7 +85,7 @@ def fmu(
     print(f"FMU written to {output}")
     print(_platforms(output))
     for name, key in replaced.items():
-        print(f"Input {name} replaces {key} of the scenario as soon as the importer sets it.")
+        print(f"Input {name} replaces {loaded.key_in_file(key)} of the scenario as soon as the importer sets it.")
     print(f"Try it with FMPy: fmpy simulate {output} --show-plot")
 
 

@@ -120,7 +120,7 @@ def _new(directory: Path | None, rig: str | None, output: Path | None) -> None:
         text = first_task(directory, home=path.parent, rig=rig or "", progress=tell)
         template = path.parent / "rig.toml"
         if rig is None and not os.path.lexists(template):
-            _write_template(template, "slide" if "SLIDE" in text else "rig")
+            _write_template(template, "slide" if "slides.SLIDE." in text else "rig")
             text = first_task(directory, home=path.parent, rig=template, progress=tell)
     try:
         with path.open("x", encoding="utf-8") as file:

@@ -241,7 +241,7 @@ def _open_loop(
     print(
         f"Next: lostmotion track {repeated}"
         if directories
-        else f"The same on a page: lostmotion servo {repeated} -o sheet"
+        else f"The same on a page: lostmotion servo {repeated} -o report"
     )
     conclude(found.verdict)
 
@@ -269,7 +269,7 @@ def _certify(
                 f"Report: {write_report(path, certificate_report(Path(source).stem, loaded.title, certificate), pictures)}"
             )
     if not directories:
-        print(f"The map as a chart: lostmotion servo {source} -o sheet")
+        print(f"The map as a chart: lostmotion servo {source} -o report")
     conclude(verdict_of(certificate))
 
 

@@ -67,6 +67,8 @@ def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> st
     inner: dotted keys of the tables within, where the key may belong.
     """
     known, inner = sorted(known), list(inner)
+    if key == "rigid" and any(path.startswith("stiffness") for path in (*known, *inner)):
+        return "is a key of data sheets; a gear without stiffness is rigid, so leave both out"
     together = [path for path in inner if path.replace(".", "_") == key]
     if same := together or [path for path in inner if path.rpartition(".")[2] == key]:
         return f"is not known here; it is written as {' or '.join(same[:MAX_NEAR])}"

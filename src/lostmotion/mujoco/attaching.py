@@ -49,16 +49,18 @@ def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Sce
 
 
 def alone_on_joint(
-    robot: mujoco.MjModel, joint: str, given: Any, controller: Controller | None, *, replace: bool
+    robot: mujoco.MjModel, joint: str, given: Any, controller: Controller | None, *, replace: bool, put: bool = False
 ) -> Scenario:
     """The same, with what robot and drive both have taken off one of them.
+
+    put: whether the robot is on a device already, so that nothing can be taken off it.
 
     Raises InputError: there is such a thing, and it is not to be replaced.
     """
     heavy = (robot.body_mass > 0.0) & (robot.body_gravcomp != 1.0)
     weighs = bool(robot.opt.gravity.any() and heavy.any()) and acts(robot, "GRAVITY")
     drive = without_weight(joint, drive_of_joint(joint, given, controller), replace=replace, weighs=weighs)
-    clear(robot, joint, drive, replace=replace)
+    clear(robot, joint, drive, replace=replace, put=put)
     return drive
 
 

@@ -100,8 +100,10 @@ def _turns_once(torque: PeriodicTorque, ratio: float) -> bool:
     return bool(2.0 * abs(first) / count > SHARE_OF_WEIGHT * max(map(abs, values)))
 
 
-def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -> None:
+def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool, put: bool = False) -> None:
     """Remove MuJoCo's own description of the drive of a joint.
+
+    put: whether the model is on a device already, where nothing can be removed.
 
     Raises InputError: there is such a thing, and it is not to be replaced or cannot be.
     """
@@ -123,10 +125,9 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool) -
         values["range"] = [(model.jnt_limited, joint)]
     own = [key for key, places in values.items() if any((array[k] != 0).any() for array, k in places)]
     own += [f"the {actuator_name(model, k)}" for k in actuators]
-    if own and not replace:
-        raise InputError(
-            f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; give replace=True, or take it off the model"
-        )
+    if own and (put or not replace):
+        remedy = "take it off the model before put_model" if put else "give replace=True, or take it off the model"
+        raise InputError(f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; {remedy}")
     for k in actuators:
         if model.actuator_plugin[k] >= 0:
             raise InputError(

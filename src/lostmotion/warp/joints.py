@@ -196,6 +196,7 @@ def attach(
     damping: Mapping[str, float] | float = 0.0,
     samples: Count = 1,
     dtype: str = "float32",
+    replace: bool = False,
 ) -> Joints:
     """Turn joints in all worlds of MuJoCo Warp by exact drives.
 
@@ -217,6 +218,8 @@ def attach(
         Samples of this law within a step.
     dtype
         Numbers of the drives: ``"float32"`` or ``"float64"``.
+    replace
+        Whether weights, load torques and inclinations of a drive give way to those of the robot. False: they are refused.
 
     Returns
     -------
@@ -272,7 +275,7 @@ def attach(
     gains = _gains(drives, stiffness, damping)
     made = {}
     for name, given in drives.items():
-        scenario = alone_on_joint(robot, name, given, None, replace=False)
+        scenario = alone_on_joint(robot, name, given, None, replace=replace, put=True)
         kinds = {motor.kind for motor in scenario.train().motors.values()}
         if name in gains and kinds != {"torque_source"}:
             raise InputError(

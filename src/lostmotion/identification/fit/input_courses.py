@@ -93,7 +93,7 @@ def nearer_ways(
         if other.mae < best.mae * (1.0 - NEARER):
             rig, best, way = changed, other, turned
         words[name] = (
-            f"{name}: {WORDS[way]}, since its samples do not tell, and fits have a mean absolute error of "
-            f"{errors['linear']:.4g} with straight lines, {errors['hold']:.4g} held"
+            f"{name}: {WORDS[way]}, since its samples do not tell, and fits have a mean absolute residual, relative "
+            f"to the deviations of the channels, of {errors['linear']:.4g} with straight lines and {errors['hold']:.4g} held"
         )
     return rig, best.point, words
