@@ -4,7 +4,6 @@
  *
  * `make c-library` builds the library into build/c and prints this line with its places.
  */
-#include <math.h>
 #include <stdio.h>
 #include <stdlib.h>
 
@@ -17,20 +16,27 @@ static void stop_if(int failed, const char* why) {
 }
 
 int main(void) {
-    const lm_parameter motor[] = {{"motor.rotor_inertia", 1e-4}, {"motor.rated_torque", 1.0}};
-    const lm_parameter gear[] = {{"gearbox.ratio", 50.0}, {"gearbox.mesh_damping", 20.0}};
-    const double stiffness[] = {1e4}, efficiencies[] = {0.44, -0.2};
-    const lm_curve mesh = {NULL, stiffness, 0};
+    const char* const joined[] = {"worm", "drum"};
+    const double one = 1.0, viscous = 1e-3, inertia = 0.5, rotor = 1e-4, ratio = 50.0, damping = 20.0;
+    const double stiffness = 1e4, driving = 0.44, overrunning = -0.2;
+    const lm_value worm[] = {{"viscous_friction", &viscous, 1}};
+    const lm_value drum[] = {{"inertia", &inertia, 1}, {"loaded", &one, 1}};
+    const lm_value motor[] = {{"kind", &one, 1}, {"rotor_inertia", &rotor, 1}, {"rated_torque", &one, 1}};
+    const lm_value gear[] = {{"ratio", &ratio, 1},
+                             {"stiffness.slopes", &stiffness, 1},
+                             {"mesh_damping", &damping, 1},
+                             {"efficiencies.driving", &driving, 1},
+                             {"efficiencies.overrunning", &overrunning, 1}};
     double *state, *variables, *inputs;
     lm_simulation* s;
     size_t k, n;
     int step;
 
     lm_train* train = lm_train_new();
-    lm_add_shaft(train, "worm", 0.0, 1e-3, 0.0, 0.0, NULL, 0);
-    lm_add_shaft(train, "drum", 0.5, 0.0, 0.0, 0.0, NULL, 1);
-    lm_add_motor(train, "motor", "worm", motor, 2, 1, INFINITY);
-    lm_add_gear(train, "gear", "worm", "drum", gear, 2, &mesh, NULL, efficiencies, NULL);
+    stop_if(lm_add(train, "shafts", "worm", NULL, 0, worm, 1) || lm_add(train, "shafts", "drum", NULL, 0, drum, 2) ||
+                lm_add(train, "motors", "motor", joined, 1, motor, 3) ||
+                lm_add(train, "gears", "gear", joined, 2, gear, 5),
+            lm_train_error(train));
     s = lm_simulation_new(train, 1e-3);
     stop_if(s == NULL, lm_train_error(train));
     lm_train_free(train);

@@ -5,6 +5,7 @@ import math
 import re
 import shutil
 import subprocess
+from collections.abc import Collection, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +14,9 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT, TRAINS, jamming
-from lostmotion import _core
 from lostmotion.model.angle_torques import TorqueCurve
-from lostmotion.model.shaft import DragCurve
-from lostmotion.model.torsion import Rigid
+from lostmotion.model.mesh_stiffness import MeshStiffness
+from lostmotion.model.train import COUPLINGS, ON_SHAFTS
 from lostmotion.simulation.forms.initial_state import start_values
 
 LIBRARY = ROOT / "build" / "c" / "liblostmotion.so"
@@ -24,16 +24,8 @@ STATES, INPUTS, VARIABLES, CAPACITIES = range(4)
 OK, INTERRUPTED, JAMMED, INVALID = 0, 1, 2, 100
 
 
-class Parameter(c.Structure):
-    _fields_ = [("key", c.c_char_p), ("value", c.c_double)]
-
-
-class Curve(c.Structure):
-    _fields_ = [("breaks", c.POINTER(c.c_double)), ("slopes", c.POINTER(c.c_double)), ("n_breaks", c.c_size_t)]
-
-
-class PeriodicCurve(c.Structure):
-    _fields_ = [("period", c.c_double), ("angles", c.POINTER(c.c_double)), ("values", c.POINTER(c.c_double)), ("n", c.c_size_t)]
+class Value(c.Structure):
+    _fields_ = [("key", c.c_char_p), ("values", c.POINTER(c.c_double)), ("n", c.c_size_t)]
 
 
 class Signal(c.Structure):
@@ -58,82 +50,74 @@ def library() -> c.CDLL:
     lib = c.CDLL(str(LIBRARY))
     for name in ("lm_train_new", "lm_simulation_new", "lm_snapshot_new"):
         getattr(lib, name).restype = c.c_void_p
-    for name in ("train_error", "error", "name", "unit", "meaning", "parameter_key", "parameter_unit"):
+    for name in ("train_error", "error", "name", "unit", "meaning"):
         getattr(lib, f"lm_{name}").restype = c.c_char_p
-    for name in ("lm_count", "lm_state_size", "lm_parameter_count"):
+    for name in ("lm_count", "lm_state_size"):
         getattr(lib, name).restype = c.c_size_t
     lib.lm_time.restype = c.c_double
     return lib
 
 
+CHOICES = {"dc": 0, "torque_source": 1, "rotation": 0, "translation": 1}
+
+
+def curve_values(curve: Any) -> dict[str, Any]:
+    """The parts of a curve by the keys of the C interface."""
+    if isinstance(curve, TorqueCurve):
+        return {"period": curve.period, "angles": curve.angles, "values": curve.torques}
+    if isinstance(curve, MeshStiffness):
+        return dict(zip(("period", "angles", "values"), curve.curve(), strict=True))
+    assert curve.odd
+    return dict(zip(("breaks", "slopes"), curve.side(True), strict=True))
+
+
+def flat(fields: Mapping[str, Any], table: str = "") -> dict[str, list[float]]:
+    """Fields of the core as the C interface has them: lists of numbers, of tables and curves by longer keys."""
+    out: dict[str, list[float]] = {}
+    for key, value in fields.items():
+        if value is None or value in ([], ()):
+            continue
+        if isinstance(value, Mapping):
+            out |= flat(value, f"{table}{key}.")
+        elif not isinstance(value, (str, int, float, list, tuple)):
+            out |= flat(curve_values(value), f"{table}{key}.")
+        else:
+            out[table + key] = [float(v) for v in np.ravel(CHOICES[value] if isinstance(value, str) else value)]
+    return out
+
+
 class Train:
     """A train of the C interface from a scenario in the long form, element by element."""
 
-    def __init__(self, library: c.CDLL, scenario: lm.Scenario) -> None:
+    def __init__(self, library: c.CDLL, scenario: lm.Scenario, given: Collection[str] = ()) -> None:
         self.lib, self.train = library, c.c_void_p(library.lm_train_new())
         train = scenario.train()
-        for name, s in train.shafts.items():
-            law = s.friction()
-            assert not law["speeds"]
-            assert s.drag is None
-            own = (s.inertia, s.viscous_friction, law["torque"], law["breakaway_torque"])
-            self.add("lm_add_shaft", name, *own, None, name in scenario.loaded())
+        for name, shaft in train.shafts.items():
+            inputs = {"loaded": name in scenario.loaded(), "given_motion": name in given}
+            self.add("shafts", name, [], shaft.core_fields() | inputs)
         for name, mass in train.mass_matrices.items():
-            shafts = (c.c_char_p * len(mass.shafts))(*(shaft.encode() for shaft in mass.shafts))
-            self.add("lm_add_mass_matrix", name, shafts, len(mass.shafts), doubles(np.ravel(mass.matrix)))
-        for name, m in train.motors.items():
-            limit = m.torque_limit if m.torque_limit is not None else float("inf")
-            parameters = self.parameters(m, "motor")
-            self.add("lm_add_motor", name, m.shaft, *parameters, m.kind == "torque_source", limit)
-        for name, g in train.gears.items():
-            curve = None
-            if not isinstance(g.stiffness, Rigid):
-                breaks, slopes = g.stiffness.pieces()
-                curve = c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks)))
-            both = doubles(g.losses.efficiencies()) if hasattr(g.losses, "efficiencies") else None
-            parameters = self.parameters(g, "gearbox")
-            self.add("lm_add_gear", name, g.input, g.output, *parameters, curve, None, both, None)
-            if g.mesh_stiffness is not None:
-                period, angles, factors = g.mesh_stiffness.curve()
-                mesh = PeriodicCurve(period, doubles(angles), doubles(factors), len(angles))
-                self.add("lm_set_mesh_stiffness", name, c.byref(mesh))
-        for name, b in train.brakes.items():
-            self.add("lm_add_brake", name, b.shaft, b.torque, b.breakaway_torque or 0.0)
-        for name, k in train.clutches.items():
-            function = {"friction": "lm_add_clutch", "safety": "lm_add_safety_clutch"}[k.kind]
-            self.add(function, name, k.input, k.output, k.torque, k.breakaway_torque or 0.0)
-        for name, f in train.freewheels.items():
-            self.add("lm_add_freewheel", name, f.input, f.output)
-        for name, d in train.dampers.items():
-            drag = None
-            if d.drag is not None:
-                assert isinstance(d.drag, DragCurve)
-                breaks = d.drag.speeds[1:-1]
-                slopes = np.diff(d.drag.torques) / np.diff(d.drag.speeds)
-                drag = c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks)))
-            self.add("lm_add_damper", name, d.input, d.output, d.viscous_friction, drag)
-        for name, t in train.angle_torques.items():
-            assert isinstance(t, TorqueCurve)
-            curve = PeriodicCurve(t.period, doubles(t.angles), doubles(t.torques), len(t.angles))
-            self.add("lm_add_angle_torque", name, t.shaft, c.byref(curve))
-        for name, s in train.springs.items():
-            breaks, slopes = s.stiffness.pieces()
-            self.add("lm_add_spring", name, s.shaft, c.byref(Curve(doubles(breaks), doubles(slopes), len(breaks))), s.rest_angle)
+            self.add("mass_matrices", name, mass.shafts, {"matrix": mass.matrix})
+        for name, motor in train.motors.items():
+            self.add("motors", name, [motor.shaft], motor.core_fields())
+        for name, gear in train.gears.items():
+            self.add("gears", name, [gear.input, gear.output], gear.core_fields() | {"mesh_stiffness": gear.mesh_stiffness})
+        for table in COUPLINGS:
+            for name, element in getattr(train, table).items():
+                self.add(table, name, [element.input, element.output], element.core_fields())
+        for table, kind in ON_SHAFTS.items():
+            for name, element in getattr(train, table).items():
+                over_angle = {"torque": element} if kind == "angle_torques" else {}
+                self.add(kind, name, [element.shaft], element.core_fields() | over_angle)
 
-    def parameters(self, part: Any, table: str) -> tuple[Any, int]:
-        keys = dict(_core.parameters())
-        values = {f"{table}.{key}": value for key, value in part.core_fields().items() if value is not None}
-        given = {key: float(value) for key, value in values.items() if key in keys}
-        array = (Parameter * max(1, len(given)))(*(Parameter(k.encode(), v) for k, v in given.items()))
-        return array, len(given)
+    def add(self, table: str, name: str, shafts: Sequence[str], fields: Mapping[str, Any]) -> None:
+        assert self.attempt(table, name, shafts, **fields) == OK, self.error()
 
-    def add(self, function: str, *arguments: Any) -> None:
-        assert self.attempt(function, *arguments) == OK, self.error()
-
-    def attempt(self, function: str, *arguments: Any) -> int:
-        types = {str: lambda a: a.encode(), float: c.c_double, bool: c.c_int, int: c.c_size_t}
-        converted = [types[type(a)](a) if type(a) in types else a for a in arguments]
-        return int(getattr(self.lib, function)(self.train, *converted))
+    def attempt(self, table: str, name: str, shafts: Sequence[str], **fields: Any) -> int:
+        values = [Value(key.encode(), doubles(numbers), len(numbers)) for key, numbers in flat(fields).items()]
+        on = (c.c_char_p * max(1, len(shafts)))(*(shaft.encode() for shaft in shafts))
+        array = (Value * max(1, len(values)))(*values)
+        n_shafts, n = c.c_size_t(len(shafts)), c.c_size_t(len(values))
+        return int(self.lib.lm_add(self.train, table.encode(), name.encode(), on, n_shafts, array, n))
 
     def error(self) -> str:
         return self.lib.lm_train_error(self.train).decode()
@@ -311,10 +295,7 @@ def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:
         },
         simulation={"duration": 1.0, "sample_interval": 0.02},
     )
-    train = Train(library, scenario)
-    assert train.attempt("lm_give_motion", "crank") == OK
-    assert train.attempt("lm_give_motion", "nix") == INVALID
-    assert train.error() == "there is no shaft 'nix'"
+    train = Train(library, scenario, given=["crank"])
     python, there = lm.Simulation(scenario, step=0.02), train.simulation(0.02)
     assert set(there.names(INPUTS)) == {"crank_given_speed", "crank_given_acceleration"}
     none = doubles([0.0, 0.0])
@@ -337,7 +318,7 @@ def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:
     assert wanted["crank_speed"] == pytest.approx(6.0 * t, rel=1e-13)
     kept = list(there.state())
     assert advance(Motion(b"lever", math.nan, 1.0, math.nan)) == INVALID
-    assert there.error() == "the motion of no shaft 'lever' is given; lm_give_motion gives it"
+    assert there.error() == "the motion of no shaft 'lever' is given; given_motion gives it"
     assert advance(Motion(b"crank", math.nan, math.nan, math.nan)) == INVALID
     assert there.error() == "the motion of 'crank' is not finite, or has no speed"
     assert list(there.state()) == kept
@@ -381,26 +362,30 @@ def test_directional_derivatives_are_those_of_finite_differences(worm: Simulatio
 
 def test_what_is_wrong_is_said_in_one_line(library: c.CDLL, worm: Simulation) -> None:
     train = Train(library, lm.load("worm-lowering"))
-    brake = ("lm_add_brake", "b", "nix", 1.0, 0.0)
-    assert train.attempt(*brake) == OK
+    assert train.attempt("brakes", "b", ["nix"], torque=1.0) == OK
     assert library.lm_train_check(train.train) == INVALID
     assert "brake 'b'" in train.error()
-    assert train.attempt("lm_add_brake", "worm", "worm", 1.0, 0.0) == INVALID
-    assert train.error() == "the name 'worm' is taken; use another one"
-    assert train.attempt("lm_add_clutch", "k", "worm", "load", -1.0, 0.0) == INVALID
-    assert train.error() == "clutch 'k': torque is -1; it must be finite and > 0"
-    assert train.attempt("lm_add_spring", "k", "worm", None, 0.0) == INVALID
-    assert train.error() == "spring 'k': has no numbers"
-    assert train.attempt("lm_set_housing", "nix", "worm") == INVALID
-    assert train.error() == "there is no gear 'nix'"
-    assert train.attempt("lm_set_housing", "coupling", "nix") == INVALID
-    assert train.error() == "there is no shaft 'nix'"
-    assert train.attempt("lm_set_housing", "coupling", "worm") == OK
+    housed = {"ratio": 2.0}
+    for table, name, shafts, fields, error in (
+        ("brakes", "worm", ["worm"], {"torque": 1.0}, "the name 'worm' is taken; use another one"),
+        ("brakes", "", ["worm"], {"torque": 1.0}, "an element has no name"),
+        ("clutches", "k", ["worm", "load"], {"torque": -1.0}, "clutch 'k': torque is -1; it must be finite and > 0"),
+        ("clutches", "k", ["worm", "load"], {"torque": [1.0, 2.0]}, "clutch 'k': torque must be one number"),
+        ("clutches", "k", ["worm"], {"torque": 1.0}, "clutch 'k': is on 1 shafts; it must be on 2"),
+        ("springs", "k", ["worm"], {"curve.breaks": 1.0, "curve.slopes": 1.0}, "spring 'k': curve.slopes must be one more than breaks"),
+        ("motors", "m2", ["worm"], {"colour": 1.0}, "motor 'm2': there is no 'colour'"),
+        ("wheels", "w", ["worm"], {}, "there is no table 'wheels'"),
+        ("gears", "g", ["worm", "drum", "nix"], housed, "gear 'g': there is no shaft 'nix' for its housing"),
+    ):
+        assert train.attempt(table, name, shafts, **fields) == INVALID
+        assert train.error() == error
+    train = Train(library, lm.load("worm-lowering"))
+    assert train.attempt("torque_limiters", "t", ["rotor", "worm"], release_torque=2.0, slip_torque=1.0) == OK
+    assert train.attempt("end_stops", "e", ["drum"], lower=-1.0, upper=1.0, stiffness=1e3) == OK
+    assert library.lm_train_check(train.train) == OK, train.error()
+    assert train.attempt("gears", "g", ["worm", "drum", "worm"], **housed) == OK
     assert library.lm_train_check(train.train) == INVALID
-    assert "gear 'coupling' has its housing on" in train.error()
-    wrong = (Parameter * 1)(Parameter(b"motor.colour", 1.0))
-    assert train.attempt("lm_add_motor", "m2", "worm", wrong, 1, False, 1.0) == INVALID
-    assert train.error() == "motor 'm2': there is no parameter 'motor.colour'"
+    assert "gear 'g' has its housing on" in train.error()
     assert worm.advance(float("nan"), [0.0, 0.0]) == INVALID
     assert worm.error().startswith("the interval must be > 0")
     assert worm.advance(1e-3, [0.0, float("inf")]) == INVALID
@@ -419,14 +404,6 @@ def test_a_jam_is_said_as_in_python(library: c.CDLL) -> None:
     inputs = [0.0 if name == "motor_command" else 20.0 for name in simulation.names(INPUTS)]
     assert simulation.advance(1e-3, inputs) == JAMMED
     assert simulation.error() == str(jammed.value)
-
-
-def test_parameters_are_those_of_scenario_files(library: c.CDLL) -> None:
-    keys = [library.lm_parameter_key(c.c_size_t(k)).decode() for k in range(library.lm_parameter_count())]
-    assert "gearbox.ratio" in keys
-    assert library.lm_parameter_key(c.c_size_t(len(keys))) is None
-    units = {key: library.lm_parameter_unit(c.c_size_t(k)).decode() for k, key in enumerate(keys)}
-    assert units["motor.rotor_inertia"] == "kg*m^2"
 
 
 def test_the_example_in_c_compiles_without_a_warning_and_runs(library: c.CDLL, tmp_path: Path) -> None:

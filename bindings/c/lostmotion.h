@@ -28,7 +28,7 @@ extern "C" {
 #endif
 
 /* Rises with every change that a caller has to know of. */
-#define LM_INTERFACE_VERSION 5
+#define LM_INTERFACE_VERSION 6
 LM_API int lm_interface_version(void);
 
 enum {
@@ -145,42 +145,36 @@ LM_API const double* lm_explanation_values(const lm_explanation* explanation, lm
 
 typedef struct lm_train lm_train;
 
-/* A number by its key in a scenario file, such as "motor.rotor_inertia" or "gearbox.ratio". */
+/* What an element has under a key of its table in scenario files: one number, as "inertia" or "torque", or a list, in
+ * SI units. What is left out has its default. These parts of an element have keys of their own:
+ *
+ *   "kind" of a motor         0: a DC motor, 1: a torque source, 2: a stepper
+ *   "domain" of a shaft       1: it is a slide. Its inertia is a mass [kg], its angle a position [m], torques on it are
+ *                             forces [N], and results have the names "<name>_position" and "<name>_load_force". The
+ *                             ratio of a screw of lead p that drives it is 2 pi/p.
+ *   "loaded" of a shaft       1: a load torque acts on it, the input "<name>_load_torque"
+ *   "given_motion" of a shaft 1: its motion is given. "<name>_given_speed" and "<name>_given_acceleration" are inputs,
+ *                             and the torque that the motion takes is the variable "<name>_drive_torque".
+ *   "friction" of a shaft     ".torque" [N m] while it slips, ".breakaway_torque" at rest; or as a curve ".speeds",
+ *                             ".torques"
+ *   "stiffness" of a gear, "drag" of a shaft or damper, "curve" of a spring
+ *                             torque over a twist or a speed, odd and piecewise linear: ".slopes", the first from 0 on,
+ *                             and between them ".breaks", one less
+ *   "torque" of an angle torque, "transmission_error" of a gear
+ *                             values over the angle of the shaft, in straight lines through points: ".period",
+ *                             ".angles", ".values"
+ *   "mesh_stiffness" of a gear the same, of factors of its stiffness, each from its angle on
+ *   "efficiencies" of a gear  ".driving", ".overrunning"
+ *   "losses" of a gear        1: of the grid "loss_map", m_2B over ".speeds" and ".loads": ".values", the speeds of
+ * each load after the other "safety" of a clutch      1: it is closed without a command "matrix"                  of a
+ * mass matrix of n shafts: n x n numbers, row by row, symmetric and positive definite, between two shafts [kg m2],
+ * between two slides [kg], between one of each [kg m]
+ */
 typedef struct {
     const char* key;
-    double value;
-} lm_parameter;
-
-/* The keys that lm_parameter knows, their units, and how many there are. NULL beyond the last. */
-LM_API size_t lm_parameter_count(void);
-LM_API const char* lm_parameter_key(size_t k);
-LM_API const char* lm_parameter_unit(size_t k);
-
-/* Torque over a twist or a speed x, odd and piecewise linear: slopes[k] between breaks[k - 1] and breaks[k] > 0;
- * slopes[0] from 0 on, and one slope more than breaks. */
-typedef struct {
-    const double* breaks;
-    const double* slopes;
-    size_t n_breaks;
-} lm_curve;
-
-/* Values over the angle, repeating with the period: by straight lines through the points, if nothing else is said. */
-typedef struct {
-    double period;
-    const double* angles;
     const double* values;
     size_t n;
-} lm_periodic_curve;
-
-/* Loss coefficient m_2B on a grid of relative speeds and relative loads: values[i * n_loads + j] at speeds[i],
- * loads[j]. */
-typedef struct {
-    const double* speeds;
-    size_t n_speeds;
-    const double* loads;
-    size_t n_loads;
-    const double* values;
-} lm_loss_map;
+} lm_value;
 
 /* NULL if there is no memory. lm_train_free(NULL) does nothing. */
 LM_API lm_train* lm_train_new(void);
@@ -189,54 +183,13 @@ LM_API void lm_train_free(lm_train* train);
 /* What the last call on this train that failed found wrong. */
 LM_API const char* lm_train_error(const lm_train* train);
 
-/* loaded: whether a load torque acts on the shaft; then "<name>_load_torque" is an input. breakaway_torque: 0, or above
- * the friction torque. drag: torque over speed, or NULL. */
-LM_API int lm_add_shaft(lm_train* train, const char* name, double inertia, double viscous_friction,
-                        double friction_torque, double breakaway_torque, const lm_curve* drag, int loaded);
-/* torque_source: the command times the rated torque acts; else a DC motor (2). torque_limit: of a torque source, or
- * INFINITY. */
-LM_API int lm_add_motor(lm_train* train, const char* name, const char* shaft, const lm_parameter* parameters, size_t n,
-                        int torque_source, double torque_limit);
-/* stiffness NULL: rigid. losses NULL: those of the parameters, if any. efficiencies NULL, or driving and overrunning.
+/* Adds an element: its table in scenario files ("shafts", "mass_matrices", "motors", "gears", "clutches", "freewheels",
+ * "dampers", "torque_limiters", "ratchets", "brakes", "angle_torques", "springs" or "end_stops"), and the shafts that
+ * it is on: none of a shaft; input and output of a gear and, where its housing is not the frame, a third; one of a
+ * brake.
  */
-LM_API int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
-                       const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
-                       const double* efficiencies, const lm_periodic_curve* transmission_error);
-/* Limits the torque of the mesh damping of a gear with backlash to that of its spring, so that no torque jumps where
- * flanks meet. LM_INVALID: there is none of that name. */
-LM_API int lm_limit_mesh_damping(lm_train* train, const char* gear);
-/* Scales the stiffness of a gear by a factor over the angle of its input shaft, as more and fewer pairs of teeth mesh:
- * factors.values[k] > 0 holds from factors.angles[k] on to the next angle. LM_INVALID: there is no gear of that name.
- */
-LM_API int lm_set_mesh_stiffness(lm_train* train, const char* gear, const lm_periodic_curve* factors);
-/* Makes a slide of a shaft: its inertia is a mass [kg], its angle a position [m], torques on it are forces [N], and
- * results have the names "<name>_position" and "<name>_load_force". The ratio of a screw of lead p that drives it is 2
- * pi/p. LM_INVALID: there is none of that name. */
-LM_API int lm_set_slide(lm_train* train, const char* shaft);
-/* The motion of a shaft or slide is given: "<name>_given_speed" and "<name>_given_acceleration" are inputs, and the
- * torque that the motion takes is the variable "<name>_drive_torque", of a slide "<name>_drive_force". LM_INVALID:
- * there is none of that name. */
-LM_API int lm_give_motion(lm_train* train, const char* shaft);
-/* The inertias of n shafts in place of their own, which are then 0: n x n numbers, row by row, symmetric and positive
- * definite. Between two shafts [kg m2], between two slides [kg], between one of each [kg m]. */
-LM_API int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* shafts, size_t n,
-                              const double* matrix);
-/* Puts the housing of a gear, by default on the frame, on a shaft. LM_INVALID: there is none of that name. */
-LM_API int lm_set_housing(lm_train* train, const char* gear, const char* shaft);
-/* torque while it slips, breakaway_torque at rest (0: the same), at command 1. */
-LM_API int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque);
-LM_API int lm_add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
-                         double breakaway_torque);
-LM_API int lm_add_safety_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
-                                double breakaway_torque);
-LM_API int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output);
-/* Torque over the slip speed: viscous friction [N m s/rad] and a curve [N m] over [rad/s], or NULL. */
-LM_API int lm_add_damper(lm_train* train, const char* name, const char* input, const char* output,
-                         double viscous_friction, const lm_curve* drag);
-LM_API int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque);
-/* A spring to the frame: torque over the angle [N m], against it, from rest_angle [rad] on. */
-LM_API int lm_add_spring(lm_train* train, const char* name, const char* shaft, const lm_curve* curve,
-                         double rest_angle);
+LM_API int lm_add(lm_train* train, const char* table, const char* name, const char* const* shafts, size_t n_shafts,
+                  const lm_value* values, size_t n);
 
 /* Whether the train can be run. */
 LM_API int lm_train_check(lm_train* train);

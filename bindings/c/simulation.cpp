@@ -46,7 +46,7 @@ std::optional<lm::ScenarioSimulation::GivenCourse> read(const lm_motion& motion,
     const auto given = [](double value) { return std::isnan(value) ? std::nullopt : std::optional(value); };
     const auto shaft = s.given_shaft(name);
     if (!shaft) {
-        wrong = "the motion of no shaft '" + name + "' is given; lm_give_motion gives it";
+        wrong = "the motion of no shaft '" + name + "' is given; given_motion gives it";
         return {};
     }
     const lm::MotionEnd to{motion.speed, given(motion.position), given(motion.acceleration)};

@@ -1,78 +1,182 @@
 // The C interface: trains, element by element.
 #include "train.hpp"
 
-#include <cmath>
 #include <new>
-#include <string>
+#include <optional>
+#include <span>
 #include <utility>
-#include <vector>
-
-#include "lostmotion/model/drive_train.hpp"
 
 namespace lm = lostmotion;
 
 namespace {
 
-std::string name_error(const lm_train& train, const char* name) {
-    if (name == nullptr || *name == '\0') return "an element has no name";
-    const auto taken = [&](const auto& elements) {
-        for (const auto& e : elements)
-            if (e.name == name) return true;
-        return false;
+using Values = std::span<const lm_value>;
+using Texts = std::vector<std::string>;
+
+// The numbers of a description of an element: what is given by key, and all else as the element has it.
+class KeyedNumbers : public lm::FieldWriter {
+ public:
+    explicit KeyedNumbers(Values values) : values_(values), used_(values.size()) {}
+
+    using FieldWriter::integer;  // the law of a curve, which has no key here
+    void number(const char* key, double v, Range = Range::any) { numbers.push_back(value(key, v)); }
+    void number(const lm::Field& field, double v) { number(field.key, v); }
+    template <class Integer>
+    void integer(const lm::Field& field, Integer v, long long, long long) {
+        number(field.key, static_cast<double>(v));
+    }
+    template <class Enum>
+    void choice(const char* key, Enum& v, std::initializer_list<const char*> names) {
+        number(key, static_cast<double>(static_cast<int>(v)));
+        for (std::size_t k = 0; k < names.size(); ++k)
+            if (numbers.back() == static_cast<double>(k)) v = static_cast<Enum>(k);
+    }
+    void flag(const char* key, bool v) { number(key, v); }
+    void flag(const lm::Field& field, bool v) { number(field.key, v); }
+    void list(const char* key, const std::vector<double>& v, Range = Range::any) {
+        const lm_value* given = find(key);
+        FieldWriter::list(key, given == nullptr ? v : ::list(given->values, given->n));
+    }
+    template <class... Entries>
+    void list(const lm::Field& field, const std::vector<double>& v, Entries...) {
+        list(field.key, v);
+    }
+    template <class T, class Use>
+    void optional(const char* key, std::optional<T>& v, const T& initial, Use&& use) {
+        if (is_given(key)) v = initial;
+        const lm::FieldPath::Step here(path_, key);
+        FieldWriter::optional(key, v, initial, use);
+    }
+    template <class Use>
+    void part(const char* key, Use&& use) {
+        const lm::FieldPath::Step here(path_, key);
+        use();
+    }
+    template <class Curve>
+    void curve(const char* key, Curve& v) {
+        part(key, [&] { describe(*this, v); });
+    }
+    template <class Curve>
+    void curve_if(const char* key, bool& there, Curve& v) {
+        there = there || is_given(key);
+        FieldWriter::flag(key, there);
+        if (there) curve(key, v);
+    }
+    // What is wrong with what was given, or nothing.
+    std::string wrong() const {
+        for (std::size_t k = 0; k < values_.size(); ++k) {
+            const std::string key = ::text(values_[k].key);
+            if (!used_[k]) return "there is no '" + key + "'";
+            if (values_[k].values == nullptr) return key + " has no numbers";
+        }
+        return not_one_.empty() ? not_one_ : not_one_ + " must be one number";
+    }
+
+ private:
+    double value(const char* key, double otherwise) {
+        const lm_value* given = find(key);
+        if (given == nullptr || given->values == nullptr) return otherwise;
+        if (given->n != 1) not_one_ = given->key;
+        return given->n == 1 ? *given->values : otherwise;
+    }
+    const lm_value* find(const char* key) {
+        const lm_value* found = nullptr;
+        for (std::size_t k = 0; k < values_.size(); ++k)
+            if (::text(values_[k].key) == path_.to(key)) {
+                used_[k] = true;
+                found = &values_[k];
+            }
+        return found;
+    }
+    bool is_given(const char* part) const {
+        const std::string begin = path_.to(part) + '.';
+        return std::ranges::any_of(values_, [&](const lm_value& v) { return ::text(v.key).starts_with(begin); });
+    }
+
+    Values values_;
+    std::vector<bool> used_;
+    std::string not_one_;
+    lm::FieldPath path_;
+};
+
+bool is_taken(const lm::model::Train& t, const std::string& name) {
+    bool taken = false;
+    const auto any = [&](const char*, const char*, const auto& elements) {
+        taken = taken || std::ranges::any_of(elements, [&](const auto& e) { return e.name == name; });
     };
-    const auto& t = train.description.train;
-    bool used = taken(t.shafts) || taken(t.motors) || taken(t.gears);
-    const auto any = [&](const char*, const char*, const auto& elements) { used = used || taken(elements); };
+    any("", "", t.shafts);
+    any("", "", t.motors);
+    any("", "", t.gears);
     lm::model::Train::each_kind(t, any);
     lm::model::Train::each_coupling_kind(t, any);
-    if (used) return "the name '" + text(name) + "' is taken; use another one";
-    return {};
+    return taken;
 }
 
-NumberLists numbers_of(const lm_loss_map& m) {
-    NumberLists axes;
-    return axes.list(m.speeds, m.n_speeds).list(m.loads, m.n_loads).list(m.values, m.n_speeds * m.n_loads);
-}
-
-// use(element): of this name, which returns what is wrong.
-template <class Element, class Use>
-int with_named(lm_train& train, std::vector<Element>& elements, const char* kind, const char* name, Use&& use) {
-    return train.attempt([&]() -> std::string {
-        for (Element& e : elements)
-            if (e.name == text(name)) return use(e);
-        return "there is no " + std::string(kind) + " '" + text(name) + "'";
-    });
-}
-
-// A train with these parameters, of which a motor or gear is taken.
-std::string read(const lm_parameter* parameters, std::size_t n, const std::string& what, lm::model::Train& to) {
-    for (std::size_t k = 0; k < n; ++k) {
-        double* value = lm::model::find_parameter(to, text(parameters[k].key));
-        if (value == nullptr) return what + ": there is no parameter '" + text(parameters[k].key) + "'";
-        if (!std::isfinite(parameters[k].value)) return what + ": " + text(parameters[k].key) + " must be finite";
-        *value = parameters[k].value;
-    }
-    return {};
-}
-
-// An element with the numbers of its description, on a shaft or between two.
-template <class Element, class... Shafts>
-int add(lm_train* train, const char* kind, const char* name, const NumberLists& numbers, Shafts... shafts) {
-    return train->attempt([&] {
-        Element element;
-        std::string wrong = name_error(*train, name);
-        if (wrong.empty()) wrong = numbers.read(element, kind + (" '" + text(name) + "'"));
-        if (!wrong.empty()) return wrong;
+std::string add(lm::model::TrainDescription& train, const std::string& table, const std::string& name, const Texts& on,
+                Values values) {
+    if (name.empty()) return "an element has no name";
+    if (is_taken(train.train, name)) return "the name '" + name + "' is taken; use another one";
+    std::string wrong = "there is no table '" + table + "'";
+    // An element of this name with its numbers, on one number of shafts or another.
+    const auto add_one = [&](const char* one, auto element, std::size_t fewest, std::size_t most, auto&& describe,
+                             auto&& put) {
+        const std::string what = one + (" '" + name + "'");
         element.name = name;
-        train->description.add(std::move(element), text(shafts)...);
-        return wrong;
+        KeyedNumbers given(values);
+        describe(given, element);
+        lm::FieldReader f(given.numbers);
+        wrong = given.wrong();
+        if (wrong.empty() && (on.size() < fewest || on.size() > most))
+            wrong = "is on " + std::to_string(on.size()) + " shafts; it must be on " + std::to_string(fewest);
+        if (wrong.empty()) describe(f, element);
+        if (wrong.empty()) wrong = f.error();
+        if (wrong.empty())
+            put(std::move(element));
+        else
+            wrong = what + ": " + wrong;
+    };
+    const auto own = [](auto& f, auto& element) { element.describe(f); };
+    const auto own_and_law = [](auto& f, auto& element) {
+        element.law.describe(f);
+        element.describe(f);
+    };
+    const auto put_on_one = [&](auto element) { train.add(std::move(element), on[0]); };
+    const auto put_between = [&](auto element) { train.add(std::move(element), on[0], on[1]); };
+    if (table == "shafts")
+        add_one(
+            "shaft", lm::model::Shaft(), 0, 0, [](auto& f, lm::model::Shaft& s) { describe(f, s); },
+            [&](lm::model::Shaft s) { train.add_shaft(std::move(s)); });
+    if (table == "mass_matrices") {
+        std::vector<double> flat(on.size() * on.size());
+        const auto put = [&](const lm::model::MassMatrix&) {
+            std::vector<std::vector<double>> rows;
+            for (std::size_t k = 0; k < on.size() && flat.size() == on.size() * on.size(); ++k)
+                rows.emplace_back(&flat[k * on.size()], &flat[k * on.size()] + on.size());
+            train.add_mass_matrix(name, on, std::move(rows));
+        };
+        add_one(
+            "mass matrix", lm::model::MassMatrix(), 1, on.size(),
+            [&](auto& f, const lm::model::MassMatrix&) { f.list("matrix", flat); }, put);
+    }
+    if (table == "motors") add_one("motor", lm::model::ShaftMotor(), 1, 1, own_and_law, put_on_one);
+    if (table == "gears") {
+        if (on.size() == 3 &&
+            std::ranges::find(train.train.shafts, on[2], &lm::model::Shaft::name) == train.train.shafts.end())
+            return "gear '" + name + "': there is no shaft '" + on[2] + "' for its housing";
+        add_one("gear", lm::model::Gear(), 2, 3, own_and_law, [&](lm::model::Gear gear) {
+            put_between(std::move(gear));
+            if (on.size() == 3) train.set_housing(name, on[2]);
+        });
+    }
+    lm::model::Train::each_kind(train.train, [&](const char* its, const char* one, const auto& elements) {
+        using Element = typename std::decay_t<decltype(elements)>::value_type;
+        if (table == its) add_one(one, Element(), 1, 1, own, put_on_one);
     });
-}
-
-int add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
-               double breakaway_torque, bool safety) {
-    const NumberLists numbers = NumberLists().number(torque).number(breakaway_torque).number(safety);
-    return add<lm::model::Clutch>(train, safety ? "safety clutch" : "clutch", name, numbers, input, output);
+    lm::model::Train::each_coupling_kind(train.train, [&](const char* its, const char* one, const auto& elements) {
+        using Element = typename std::decay_t<decltype(elements)>::value_type;
+        if (table == its) add_one(one, Element(), 2, 2, own, put_between);
+    });
+    return wrong;
 }
 
 }  // namespace
@@ -81,168 +185,15 @@ extern "C" {
 
 int lm_interface_version(void) { return LM_INTERFACE_VERSION; }
 
-size_t lm_parameter_count(void) { return lm::model::parameters().size(); }
-const char* lm_parameter_key(size_t k) {
-    return k < lm_parameter_count() ? lm::model::parameters()[k].key.c_str() : nullptr;
-}
-const char* lm_parameter_unit(size_t k) {
-    return k < lm_parameter_count() ? lm::model::parameters()[k].unit.c_str() : nullptr;
-}
-
 lm_train* lm_train_new(void) { return new (std::nothrow) lm_train; }
 void lm_train_free(lm_train* train) { delete train; }
 const char* lm_train_error(const lm_train* train) { return train->error.c_str(); }
 
-int lm_add_shaft(lm_train* train, const char* name, double inertia, double viscous_friction, double friction_torque,
-                 double breakaway_torque, const lm_curve* drag, int loaded) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        lm::model::Shaft s;
-        const std::string what = "shaft '" + text(name) + "'";
-        const NumberLists own = NumberLists().number(inertia).number(viscous_friction);
-        const NumberLists friction = NumberLists()
-                                         .number(0.0)
-                                         .number(friction_torque)
-                                         .number(breakaway_torque)
-                                         .list(nullptr, 0)
-                                         .list(nullptr, 0);
-        if (wrong.empty()) wrong = own.read(s, what);
-        if (wrong.empty()) wrong = friction.read(s.friction, what + ": friction");
-        if (wrong.empty() && drag != nullptr) wrong = NumberLists().curve(drag).read(s.drag, what + ": drag");
-        if (!wrong.empty()) return wrong;
-        s.name = name;
-        s.loaded = loaded != 0;
-        train->description.add_shaft(std::move(s));
-        return wrong;
-    });
-}
-
-int lm_add_motor(lm_train* train, const char* name, const char* shaft, const lm_parameter* parameters, size_t n,
-                 int torque_source, double torque_limit) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        lm::model::Train drive = lm::model::drive_train();
-        if (wrong.empty()) wrong = read(parameters, n, "motor '" + text(name) + "'", drive);
-        if (!wrong.empty()) return wrong;
-        drive.motors[0].law.kind = torque_source != 0 ? lm::Motor::torque_source : lm::Motor::dc;
-        drive.motors[0].name = name;
-        drive.motors[0].torque_limit = torque_limit;
-        train->description.add(std::move(drive.motors[0]), text(shaft));
-        return wrong;
-    });
-}
-
-int lm_add_gear(lm_train* train, const char* name, const char* input, const char* output,
-                const lm_parameter* parameters, size_t n, const lm_curve* stiffness, const lm_loss_map* losses,
-                const double* efficiencies, const lm_periodic_curve* transmission_error) {
-    return train->attempt([&] {
-        const std::string what = "gear '" + text(name) + "'";
-        std::string wrong = name_error(*train, name);
-        lm::model::Train drive = lm::model::drive_train();
-        lm::model::Gear& gear = drive.gears[0];
-        lm::Gearbox& law = gear.law;
-        if (wrong.empty()) wrong = read(parameters, n, what, drive);
-        if (wrong.empty() && stiffness != nullptr) {
-            law.compliance = lm::Gearbox::torsion_curve;
-            wrong = NumberLists().curve(stiffness).read(law.curve, what + ": stiffness");
-        }
-        if (wrong.empty() && losses != nullptr) {
-            law.losses = lm::Gearbox::loss_map;
-            wrong = numbers_of(*losses).read(law.map, what + ": losses");
-        }
-        if (wrong.empty() && transmission_error != nullptr)
-            wrong =
-                NumberLists().curve(transmission_error).read(gear.transmission_error, what + ": transmission error");
-        if (!wrong.empty()) return wrong;
-        if (efficiencies != nullptr) gear.efficiencies.emplace(efficiencies[0], efficiencies[1]);
-        gear.name = name;
-        train->description.add(std::move(gear), text(input), text(output));
-        return wrong;
-    });
-}
-
-int lm_limit_mesh_damping(lm_train* train, const char* gear) {
-    return with_named(*train, train->description.train.gears, "gear", gear, [](lm::model::Gear& g) {
-        g.damping_limited = true;
-        return std::string{};
-    });
-}
-
-int lm_set_mesh_stiffness(lm_train* train, const char* gear, const lm_periodic_curve* factors) {
-    return with_named(*train, train->description.train.gears, "gear", gear, [&](lm::model::Gear& g) {
-        return NumberLists().curve(factors).read(g.mesh_stiffness, "gear '" + g.name + "': mesh stiffness");
-    });
-}
-
-int lm_set_slide(lm_train* train, const char* shaft) {
-    return with_named(*train, train->description.train.shafts, "shaft", shaft, [](lm::model::Shaft& s) {
-        s.domain = lm::model::Domain::translation;
-        return std::string{};
-    });
-}
-
-int lm_give_motion(lm_train* train, const char* shaft) {
-    return with_named(*train, train->description.train.shafts, "shaft", shaft, [](lm::model::Shaft& s) {
-        s.given_motion = true;
-        return std::string{};
-    });
-}
-
-int lm_add_mass_matrix(lm_train* train, const char* name, const char* const* shafts, size_t n, const double* matrix) {
-    return train->attempt([&] {
-        std::string wrong = name_error(*train, name);
-        if (wrong.empty() && (shafts == nullptr || matrix == nullptr || n == 0))
-            wrong = "mass matrix '" + text(name) + "' has no shafts or no numbers";
-        if (!wrong.empty()) return wrong;
-        std::vector<std::string> names;
-        std::vector<std::vector<double>> rows;
-        for (size_t k = 0; k < n; ++k) {
-            names.push_back(text(shafts[k]));
-            rows.emplace_back(matrix + k * n, matrix + (k + 1) * n);
-        }
-        train->description.add_mass_matrix(name, names, std::move(rows));
-        return wrong;
-    });
-}
-
-int lm_set_housing(lm_train* train, const char* gear, const char* shaft) {
-    lm::model::TrainDescription& of = train->description;
-    const auto set = [&](const auto&) {
-        of.set_housing(text(gear), text(shaft));
-        return std::string{};
-    };
-    const auto nothing = [](const auto&) { return std::string{}; };
-    const int known = with_named(*train, of.train.gears, "gear", gear, nothing);
-    return known != LM_OK ? known : with_named(*train, of.train.shafts, "shaft", shaft, set);
-}
-
-int lm_add_brake(lm_train* train, const char* name, const char* shaft, double torque, double breakaway_torque) {
-    return add<lm::model::Brake>(train, "brake", name, NumberLists().number(torque).number(breakaway_torque), shaft);
-}
-int lm_add_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
-                  double breakaway_torque) {
-    return add_clutch(train, name, input, output, torque, breakaway_torque, false);
-}
-int lm_add_safety_clutch(lm_train* train, const char* name, const char* input, const char* output, double torque,
-                         double breakaway_torque) {
-    return add_clutch(train, name, input, output, torque, breakaway_torque, true);
-}
-int lm_add_freewheel(lm_train* train, const char* name, const char* input, const char* output) {
-    return add<lm::model::Freewheel>(train, "freewheel", name, NumberLists(), input, output);
-}
-int lm_add_damper(lm_train* train, const char* name, const char* input, const char* output, double viscous_friction,
-                  const lm_curve* drag) {
-    const double slope = 0.0;
-    const lm_curve none{nullptr, &slope, 0};
-    return add<lm::model::Damper>(train, "damper", name,
-                                  NumberLists().number(viscous_friction).curve(drag != nullptr ? drag : &none), input,
-                                  output);
-}
-int lm_add_angle_torque(lm_train* train, const char* name, const char* shaft, const lm_periodic_curve* torque) {
-    return add<lm::model::AngleTorque>(train, "angle torque", name, NumberLists().curve(torque), shaft);
-}
-int lm_add_spring(lm_train* train, const char* name, const char* shaft, const lm_curve* curve, double rest_angle) {
-    return add<lm::model::Spring>(train, "spring", name, NumberLists().curve(curve).number(rest_angle), shaft);
+int lm_add(lm_train* train, const char* table, const char* name, const char* const* shafts, size_t n_shafts,
+           const lm_value* values, size_t n) {
+    Texts on;
+    for (size_t k = 0; k < n_shafts; ++k) on.push_back(text(shafts[k]));
+    return train->attempt([&] { return add(train->description, text(table), text(name), on, {values, n}); });
 }
 
 }  // extern "C"

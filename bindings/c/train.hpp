@@ -5,7 +5,6 @@
 #include <cmath>
 #include <exception>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "lostmotion.h"
@@ -48,42 +47,20 @@ inline std::vector<double> list(const double* from, std::size_t n) {
 // Lists of numbers in the order of a description, each with its length.
 class NumberLists {
  public:
-    NumberLists& number(double v) {
-        numbers_.push_back(v);
-        return *this;
-    }
     // width: of an entry.
-    NumberLists& list(const double* from, std::size_t n, std::size_t width = 1) {
+    NumberLists& list(const double* from, std::size_t n, std::size_t width) {
         missing_ = missing_ || (from == nullptr && n > 0);
-        number(static_cast<double>(n));
+        numbers_.push_back(static_cast<double>(n));
         if (from != nullptr) numbers_.insert(numbers_.end(), from, from + n * width);
         return *this;
     }
-    // The same in both directions. NULL: missing.
-    NumberLists& curve(const lm_curve* c) {
-        missing_ = missing_ || c == nullptr;
-        number(0.0);
-        for (int side = 0; side < 2 && c != nullptr; ++side)
-            list(c->breaks, c->n_breaks).list(c->slopes, c->n_breaks + 1);
-        return *this;
-    }
-    NumberLists& curve(const lm_periodic_curve* c) {
-        missing_ = missing_ || c == nullptr;
-        number(0.0);
-        if (c != nullptr) number(c->period).list(c->angles, c->n).list(c->values, c->n);
-        return number(0.0).number(1.0).number(0.0);  // of no sine
-    }
     // What is wrong with the part that is described so.
     template <class Part>
-    std::string read(Part& to, const std::string& what = {}) const {
-        const std::string about = what.empty() ? what : what + ": ";
-        if (missing_) return about + "has no numbers";
+    std::string read(Part& to) const {
+        if (missing_) return "has no numbers";
         lostmotion::FieldReader f(numbers_);
-        if constexpr (requires { to.describe(f); })
-            to.describe(f);
-        else
-            describe(f, to);
-        return f.well() ? std::string() : about + f.error();
+        describe(f, to);
+        return f.error();
     }
 
  private:
