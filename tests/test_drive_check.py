@@ -205,7 +205,7 @@ def test_a_load_that_slows_down_for_long_is_not_said_to_go_on():
 
 # --- all rules ---
 
-OF_THUMB = ("inertia_ratio", "resonance", "dead_zone")
+OF_THUMB = ("inertia_ratio", "resonance", "dead_zone", "end_stop")
 OTHERWISE = {
     "average_output_torque": {"gearbox.rated_output_torque": 1.0},
     "peak_output_torque": {"gearbox.limits.peak_output_torque": 1.0},
@@ -221,6 +221,7 @@ OTHERWISE = {
     "dead_zone": {"motor.friction_torque": 0.3},
     "lost_motion": {"gearbox.stiffness": {"kind": "curve", "slopes": [2e4], "backlash": 2e-3}},
     "holding": {"load.torque": 0.1},
+    "end_stop": {"load.end_stops": {"lower": -0.1, "upper": 0.02, "stiffness": 1e4}},
 }
 
 
@@ -228,6 +229,7 @@ OTHERWISE = {
 def test_no_verdict_is_the_same_for_every_drive(rule: str):
     of_twist = rule in ("resonance", "lost_motion")
     base = {"gearbox.stiffness": {"kind": "linear", "stiffness": 2e4}} if of_twist else {}
+    base |= {"load.end_stops": {"lower": -9.0, "upper": 9.0, "stiffness": 1e4}} if rule == "end_stop" else {}
     first, second = (by_rule(s)[rule] for s in (move(**base), move(**base | OTHERWISE[rule])))
     beyond = "caution" if rule in OF_THUMB else "warning"
     assert {first.verdict, second.verdict} == {"ok", beyond}

@@ -21,7 +21,7 @@ from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
 from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map
 from .life import HOUR, AxialLoad, screw_life
-from .motion_check import resonances
+from .motion_check import end_stop, resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
 from .motor_run import oriented_amplitudes
 from .power_off import holdings
@@ -92,6 +92,11 @@ def _findings(scenario: Scenario) -> list[Finding]:
     findings += holdings(scenario, result)
     findings += bus_findings(result, powers, scenario.task.supply, scenario.task.cycle)
     findings += _amplifier(scenario, result)
+    findings += [
+        end_stop(shaft, result[train.variable(shaft, "end_stop_torque")], slides=train.is_slide(shaft))
+        for shaft in train.shafts
+        if train.shafts[shaft].end_stops is not None
+    ]
     if any(isinstance(gear.losses, LossMap) for gear in train.gears.values()):
         findings.append(loss_map(result))
     return findings

@@ -34,11 +34,14 @@ RULES = {
     "self_locking": "linear regime of the steady motion under the load: docs/self-locking.md",
     "motor_peak_torque": "the motor's data sheet",
     "estimated_losses": "the same check with the least and the largest losses of gearboxes of the kind",
+    "end_stop": "the run: contact of a shaft or a slide with the end of its travel",
     "loss_map": "the run, and the data of gearbox.losses",
     "lost_steps": "the run: a rotor slips where it is two full steps off its field",
     "stepper_torque": "torque of the run with the pull-out torque of the two-phase circuit; 1.5 times it is a rule of thumb",
     "step_resonance": "sqrt(n T_H/J)/(2 pi), with the full steps of the run",
 }
+
+WITHOUT_SHARE = ("resonance", "dead_zone", "holding", "loss_map", "end_stop")  # rules that compare with no limit
 
 # Rules that only tasks have.
 TASK_RULES = {

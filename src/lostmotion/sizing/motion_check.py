@@ -1,8 +1,10 @@
-"""The check of the motion of a drive: inertia ratio, resonance."""
+"""The check of the motion of a drive: inertia ratio, resonance, end stops."""
 
 from __future__ import annotations
 
 import math
+
+import numpy as np
 
 from ..control.command import CommandSignal
 from ..model.gearbox import Gearbox
@@ -78,3 +80,13 @@ def resonance(motor: Motor, g: Gearbox, load_inertia: float, command: CommandSig
         verdict: Judgement = "caution" if near else "ok"
         out.append(Finding("resonance", f"resonance on the {name} segment", value, verdict, remark))
     return out
+
+
+def end_stop(shaft: str, torque: np.ndarray, *, slides: bool) -> Finding:
+    """Whether the run presses a shaft or a slide on an end stop, and the largest torque [N·m], of a slide force [N], there."""
+    largest = float(np.abs(torque).max())
+    what = f"end stops of {shaft}"
+    if largest == 0.0:
+        return Finding("end_stop", what, "not touched", "ok")
+    value = f"pressed with up to {largest:.4g} {'N' if slides else 'N·m'}"
+    return Finding("end_stop", what, value, "caution", "the travel of the motion ends at a stop")

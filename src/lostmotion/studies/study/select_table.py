@@ -7,12 +7,12 @@ from pydantic import Field
 from ...inputs.part import Part
 from ...inputs.quantities import Switch
 from ...sizing.axis_task.column_bounds import Bound
-from ...sizing.finding import RULES, TASK_RULES
+from ...sizing.finding import RULES, TASK_RULES, WITHOUT_SHARE
 
 Direction = Literal["least", "largest"]
 
 USE = "use of "  # begins the columns of the drive check: the share of each limit that is used
-SHARES = tuple(rule for rule in RULES if rule not in ("resonance", "dead_zone", "holding", "loss_map"))
+SHARES = tuple(rule for rule in RULES if rule not in WITHOUT_SHARE)
 """rules of the drive check that compare a value with a limit"""
 TASK_SHARES = (*SHARES, *TASK_RULES)  # the same of tasks
 
