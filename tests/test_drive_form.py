@@ -66,6 +66,30 @@ def test_the_short_form_has_the_bits_of_the_long_form(load: dict[str, Any], gear
     assert lm.switchings_of(one).sizes["switching"] > 2
 
 
+@pytest.mark.parametrize(
+    "wider",
+    [
+        {"stiffness": FLANKS},
+        {"stiffness": {"kind": "rigid"}, "load": {"end_stops": {"lower": "-20 deg", "upper": "20 deg", "restitution": 0.4}}},
+        {"load": {"motion": MOVES}},
+    ],
+    ids=["flanks", "end stops", "moves"],
+)
+def test_replace_takes_the_keys_of_the_file_for_what_only_drive_trains_have(wider: dict[str, Any], tmp_path: Path) -> None:
+    """As written into the file; twice, by the long form, and named so where a value cannot be used."""
+    tables = short(**wider)
+    scenario, changes = (
+        lm.Scenario(**tables),
+        {"load.torque": 0.3, "gearbox.ratio": 5.0, "command.amplitude": 0.2, "motor.rotor_inertia": 2e-4},
+    )
+    written = tables | {"load": tables["load"] | {"torque": {"mean": 0.3}}, "gearbox": tables["gearbox"] | {"ratio": 5.0}}
+    written |= {"command": SHORT["command"] | {"amplitude": 0.2}, "motor": SHORT["motor"] | {"rotor_inertia": 2e-4}}
+    once = scenario.replace(**changes)
+    assert once == lm.Scenario(**written)
+    assert once.replace(**{"load.torque": 0.5}) == scenario.replace(**{**changes, "shafts.load.torque": 0.5})
+    refused(lambda: once.replace(**{"gearbox.ratio": 0.0}), "gearbox.ratio")
+
+
 def test_the_drive_torque_of_a_given_load_by_hand() -> None:
     """Rigid: (J + i^2 J_m) a + friction + load torque - i M while it turns forward."""
     result = lm.simulate(lm.Scenario.model_validate(short({"motion": MOVES}, stiffness={"kind": "rigid"})))

@@ -175,6 +175,11 @@ def test_a_key_of_the_run_limits_a_column(key: str, form: str) -> None:
     assert COLUMN_OF[key] in study.select.limits
 
 
+@pytest.mark.parametrize("form", FORMS)
+def test_microsteps_without_a_stepper_are_refused(form: str) -> None:
+    refused(lambda: task_of(changed(form, task={"microsteps": 8})), "task.microsteps")
+
+
 def test_the_force_of_an_emergency_stop() -> None:
     """|m g sin + m a| of a vertical slide that comes down, with the ratings of the screw, the rack, the belt and the linear motor."""
     force = 100.0 * (G + 5.0)

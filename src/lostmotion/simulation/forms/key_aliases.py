@@ -60,9 +60,10 @@ class Form:
         return key if key == "command" else renamed(key, dict(self.back))
 
 
-def _axis_back() -> Iterator[tuple[str, str]]:
-    yield from ((key, key) for key in (f"command.{MOTOR}", f"command.{BRAKE}"))
-    yield from _first_of(_AXIS.items()).items()
+def _back(keys: Mapping[str, str], *commands: str) -> Iterator[tuple[str, str]]:
+    """Keys of files in the long form, which the tables are kept in; keys of commands in the long form stay."""
+    yield from ((key, key) for key in commands)
+    yield from _first_of(keys.items()).items()
 
 
 def _first_of(keys: Iterable[tuple[str, str]]) -> dict[str, str]:
@@ -75,7 +76,9 @@ def _first_of(keys: Iterable[tuple[str, str]]) -> dict[str, str]:
 
 TRAIN = Form((), ())
 DRIVE = Form(tuple(_DRIVE.items()), tuple(_DRIVE.items()))
-AXIS = Form(tuple(_AXIS.items()), tuple(_axis_back()))
+TRAIN_OF_DRIVE = Form(tuple(_DRIVE.items()), tuple(_back(_DRIVE, f"command.{MOTOR}")))
+"""of files of a motor, a gearbox and a load whose tables are kept in the long form, for what only drive trains have"""
+AXIS = Form(tuple(_AXIS.items()), tuple(_back(_AXIS, f"command.{MOTOR}", f"command.{BRAKE}")))
 
 
 def in_file(key: str, tables: Mapping[str, Any]) -> str:

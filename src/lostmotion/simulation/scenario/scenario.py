@@ -36,7 +36,7 @@ from ..forms.common_tables import SimulationTable
 from ..forms.dotted_keys import set_values
 from ..forms.drive_tables import DriveTables, Initial, LoadTable
 from ..forms.initial_state import angles_at_start, given_speeds, start_values
-from ..forms.key_aliases import AXIS, DRIVE, TRAIN, Form
+from ..forms.key_aliases import AXIS, DRIVE, TRAIN, TRAIN_OF_DRIVE, Form
 from ..forms.train_checks import check_train
 from ..forms.train_tables import LINEAR_INITIAL, ShaftTable, TrainInitial, TrainTables, core_train
 from ..variables import Variable, variables_of_core
@@ -105,8 +105,8 @@ class Scenario:
             if drive_form.is_short(data):
                 self._set(DriveTables(**data).long(), DRIVE)
             else:
-                with _in_keys(DRIVE.in_file):
-                    self._set(TrainTables(**drive_form.long_form(data)), TRAIN)
+                with _in_keys(TRAIN_OF_DRIVE.in_file):
+                    self._set(TrainTables(**drive_form.long_form(data)), TRAIN_OF_DRIVE)
 
     def _set(self, tables: TrainTables, form: Form, *, checked: bool = True) -> None:
         for name, value in (("tables", tables), ("form", form), ("_made", {})):
@@ -285,7 +285,7 @@ class Scenario:
             axis_form.on_slide(data)
         with _in_keys(self.key_in_file):
             made = type(self)(**data)
-        return self.of(made.tables, self.form, checked=False) if self.form == AXIS else made
+        return made if self.form == DRIVE else self.of(made.tables, self.form, checked=False)
 
     def with_inputs(self, **changes: Any) -> Self:
         """The same scenario with the inputs and times that `simulate` is given; None leaves a value as it is."""

@@ -158,6 +158,8 @@ def task_of(tables: dict[str, Any], directory: Path = Path()) -> Study:
             written["motor"] = NO_PAIR
     else:
         written |= {"motor": NO_PAIR, "gearbox": DIRECT.model_dump()}
+    if "microsteps" in task.model_fields_set and not task.steppers:
+        raise InputError("are of the driver of a stepper, and no candidate is one; leave it out", "task.microsteps")
     return Study(
         title=written["title"],
         scenario=Scenario(**written),
