@@ -12,7 +12,9 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
 #include <memory>
+#include <tuple>
 #include <vector>
 
 namespace lostmotion::binding {
@@ -30,6 +32,24 @@ inline Array as_array(std::unique_ptr<double[]> data, const std::vector<std::siz
     double* raw = data.release();
     nb::capsule owner(raw, [](void* p) noexcept { delete[] static_cast<double*>(p); });
     return Array(raw, shape.size(), shape.data(), owner);
+}
+
+inline Array as_array(const std::vector<double>& values, const std::vector<std::size_t>& shape) {
+    auto data = std::make_unique_for_overwrite<double[]>(values.size());
+    std::copy(values.begin(), values.end(), data.get());
+    return as_array(std::move(data), shape);
+}
+
+// A member of each of several, such as a name; or several members, as tuples.
+template <class All, class Member>
+auto each_of(const All& all, Member member) {
+    std::vector<std::decay_t<decltype(std::invoke(member, *all.begin()))>> out;
+    for (const auto& one : all) out.push_back(std::invoke(member, one));
+    return out;
+}
+template <class All, class... Members>
+auto rows_of(const All& all, Members... members) {
+    return each_of(all, [=](const auto& one) { return std::make_tuple(std::invoke(members, one)...); });
 }
 
 // An entry of each result, `shape` the shape of one: values(result, to) writes it.

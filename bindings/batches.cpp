@@ -56,12 +56,6 @@ Array answers_of(std::size_t size, Inertia&& inertia, Load&& load, Step&& step) 
     return as_array(std::move(data), {3, size});
 }
 
-template <class Batch>
-void restore_batch(Batch& b, const typename Batch::Snapshot& s) {
-    if (s.of != &b) throw nb::type_error("a snapshot of another batch");
-    b.restore(s);
-}
-
 // One after the other, as rows of an array of the batch itself.
 template <class Batch>
 auto batch_rows(Batch& b, double* rows, std::size_t n) {
@@ -96,23 +90,32 @@ std::vector<Scenario> batch_scenarios(const std::vector<const TrainDescription*>
     return kinds;
 }
 
-template <class Batch>
-std::vector<std::string> variable_names(const Batch& b) {
-    std::vector<std::string> names;
-    for (const Variable& v : b.variables().all()) names.push_back(v.name);
-    return names;
-}
-
-void bind_exact_batch(nb::module_& m) {
-    using B = batch::ExactBatch;
-    nb::class_<B::Snapshot>(m, "ExactBatchSnapshot");
-    nb::class_<B>(m, "ExactBatch")
+// What both kinds of batches have. memory: what its bytes are of.
+template <class B>
+nb::class_<B> bind_batch(nb::module_& m, const char* name, const char* snapshot, const char* memory) {
+    nb::class_<typename B::Snapshot>(m, snapshot);
+    return nb::class_<B>(m, name)
         .def(
             "__init__",
             [](B* self, const std::vector<const TrainDescription*>& trains, const std::vector<BoundControl>& controls,
                const std::vector<int>& kind_of,
                double step) { new (self) B(batch_scenarios(trains, controls), kind_of, step); },
             "trains"_a, nb::kw_only(), "controls"_a, "kind_of"_a, "step"_a)
+        .def_prop_ro("variables", [](const B& b) { return each_of(b.variables().all(), &Variable::name); })
+        .def("snapshot", &B::snapshot)
+        .def(
+            "restore",
+            [](B& b, const typename B::Snapshot& s) {
+                if (s.of != &b) throw nb::type_error("a snapshot of another batch");
+                b.restore(s);
+            },
+            "snapshot"_a)
+        .def_prop_ro("memory", &B::memory, memory);
+}
+
+void bind_exact_batch(nb::module_& m) {
+    using B = batch::ExactBatch;
+    bind_batch<B>(m, "ExactBatch", "ExactBatchSnapshot", "Bytes, without what the solvers keep of the regimes.")
         .def(
             "step",
             [](B& b, const std::vector<BatchInput>& inputs, const std::optional<BatchInput>& speed,
@@ -157,13 +160,9 @@ void bind_exact_batch(nb::module_& m) {
             "which"_a.none(), "start"_a)
         .def_prop_ro("inputs", &B::inputs)
         .def_prop_ro("states", &B::states)
-        .def_prop_ro("variables", &variable_names<B>)
         .def_prop_ro(
             "values", [](B& b) { return batch_rows(b, b.values(), b.variables().size()); },
-            "The values of all drives, by variable; each step writes them anew.")
-        .def("snapshot", &B::snapshot)
-        .def("restore", &restore_batch<B>, "snapshot"_a)
-        .def_prop_ro("memory", &B::memory, "Bytes, without what the solvers keep of the regimes.");
+            "The values of all drives, by variable; each step writes them anew.");
 }
 
 // Laws and data sheet of a drive, as a kernel for graphics processors takes them.
@@ -200,14 +199,7 @@ nb::dict laws_of_drive(const model::Train& train) {
 void bind_batches(nb::module_& m) {
     bind_exact_batch(m);
     using B = batch::DriveBatch;
-    nb::class_<B::Snapshot>(m, "BatchSnapshot");
-    nb::class_<B>(m, "DriveBatch")
-        .def(
-            "__init__",
-            [](B* self, const std::vector<const TrainDescription*>& trains, const std::vector<BoundControl>& controls,
-               std::vector<int> kind_of,
-               double step) { new (self) B(batch_scenarios(trains, controls), std::move(kind_of), step); },
-            "trains"_a, nb::kw_only(), "controls"_a, "kind_of"_a, "step"_a)
+    bind_batch<B>(m, "DriveBatch", "BatchSnapshot", "Bytes of states and parameters.")
         .def(
             "set",
             [](B& b, const std::string& key, const BatchInput& values) {
@@ -265,7 +257,6 @@ void bind_batches(nb::module_& m) {
         .def("twist_contact",
              [](const B& b) { return read_contacts(b, [&](std::int8_t* out) { b.read_twist_contact(out); }); })
         .def_prop_ro("inputs", [](const B& b) { return b.names().inputs; })
-        .def_prop_ro("variables", &variable_names<B>)
         .def(
             "read",
             [](B& b, std::size_t variable) {
@@ -284,14 +275,10 @@ void bind_batches(nb::module_& m) {
                 return read_batch(b, [&](double* out) { b.read_tangent(parameter, state, out); });
             },
             "parameter"_a, "state"_a)
-        .def("snapshot", &B::snapshot)
-        .def("restore", &restore_batch<B>, "snapshot"_a)
-        .def_prop_ro("counts",
-                     [](const B& b) {
-                         const batch::Counts& c = b.counts();
-                         return std::make_tuple(c.steps, c.walked, c.general, c.switchings);
-                     })
-        .def_prop_ro("memory", &B::memory, "Bytes of states and parameters.");
+        .def_prop_ro("counts", [](const B& b) {
+            const batch::Counts& c = b.counts();
+            return std::make_tuple(c.steps, c.walked, c.general, c.switchings);
+        });
 }
 
 }  // namespace lostmotion::binding

@@ -116,9 +116,7 @@ std::unique_ptr<double[]> control_room(Options& options) {
 }
 
 inline Array as_array(const control::LinearStep& step) {
-    auto data = std::make_unique_for_overwrite<double[]>(step.rows.size());
-    std::copy(step.rows.begin(), step.rows.end(), data.get());
-    return as_array(std::move(data), {step.rows.size() / step.columns, step.columns});
+    return as_array(step.rows, {step.rows.size() / step.columns, step.columns});
 }
 
 inline void bind_linear_steps(nb::module_& m) {
@@ -159,10 +157,9 @@ inline void bind_linear_steps(nb::module_& m) {
 }
 
 template <class Names>
-std::vector<std::tuple<std::string, std::string, std::string>> signal_names(const Names& names) {
-    std::vector<std::tuple<std::string, std::string, std::string>> out;
-    for (const auto& [name, unit, meaning] : names) out.emplace_back(name, unit, meaning);
-    return out;
+auto signal_names(const Names& names) {
+    using Named = control::AxisSignalName;
+    return rows_of(names, &Named::name, &Named::unit, &Named::meaning);
 }
 
 inline void bind_control(nb::module_& m) {
@@ -215,7 +212,6 @@ inline void bind_control(nb::module_& m) {
         .def_ro("motor", &BoundAxis::motor)
         .def_ro("position_shaft", &BoundAxis::position_shaft)
         .def_ro("speed_shaft", &BoundAxis::speed_shaft)
-        .def_ro("reference_shaft", &BoundAxis::reference_shaft)
         .def(
             "least_current",
             [](const BoundAxis& a, double torque) {

@@ -9,11 +9,7 @@ inline void bind_names(nb::module_& m) {
     const auto drive = [] { return model::Assembly(model::drive_train()); };
     m.def(
         "aliases_of_drive",
-        [] {
-            std::vector<std::pair<std::string, std::string>> all;
-            for (const model::Alias& a : model::aliases_of_drive()) all.emplace_back(a.name, a.shown);
-            return all;
-        },
+        [] { return rows_of(model::aliases_of_drive(), &model::Alias::name, &model::Alias::shown); },
         "What the results of a motor, a gearbox and a load are called: name in the long form and name that is shown.");
     m.def("result_name", &model::result_name, "element"_a, "what"_a, "slide"_a,
           "Name of a result variable: NAME_WHAT, of a slide with position, deflection and force.");
@@ -27,31 +23,13 @@ inline void bind_names(nb::module_& m) {
         return SwitchingTable(a).columns();
     });
     m.def(
-        "causes",
-        [] {
-            std::vector<std::pair<int, std::string>> all;
-            for (const SwitchingCause& c : switching_causes()) all.emplace_back(c.number, c.name);
-            return all;
-        },
+        "causes", [] { return rows_of(switching_causes(), &SwitchingCause::number, &SwitchingCause::name); },
         "Of switchings: number and name.");
     m.def(
-        "parameters",
-        [] {
-            std::vector<std::pair<std::string, std::string>> all;
-            for (const model::Parameter& p : model::parameters()) all.emplace_back(p.key, p.unit);
-            return all;
-        },
+        "parameters", [] { return rows_of(model::parameters(), &model::Parameter::key, &model::Parameter::unit); },
         "Of a drive: key and unit.");
-    m.def("batch_fields", [] {
-        std::vector<std::string> keys;
-        for (const BatchField& f : batch_fields()) keys.push_back(f.key);
-        return keys;
-    });
-    m.def("reductions", [] {
-        std::vector<std::string> names;
-        for (const auto& row : reduction_names) names.emplace_back(row.name);
-        return names;
-    });
+    m.def("batch_fields", [] { return each_of(batch_fields(), &BatchField::key); });
+    m.def("reductions", [] { return each_of(reduction_names, &ReductionName::name); });
 }
 
 }  // namespace lostmotion::binding

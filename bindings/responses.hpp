@@ -23,11 +23,6 @@ inline Record respond(const TrainDescription& train, const std::vector<Point>& a
     }
     watch.check();
     const std::size_t count = points.size(), n = t.components.size(), c = t.channels;
-    const auto array = [](const std::vector<double>& values, const std::vector<std::size_t>& shape) {
-        auto data = std::make_unique_for_overwrite<double[]>(values.size());
-        std::copy(values.begin(), values.end(), data.get());
-        return as_array(std::move(data), shape);
-    };
     Record out;
     out["components"] = t.components;
     out["neutral"] = t.neutral;
@@ -36,13 +31,13 @@ inline Record respond(const TrainDescription& train, const std::vector<Point>& a
         {"converged", &t.converged},       {"smooth", &t.smooth},         {"periods", &t.periods},
         {"newton_steps", &t.newton_steps}, {"period", &t.period},         {"residual", &t.residual},
         {"motor_power", &t.motor_power},   {"load_power", &t.load_power}, {"gear_loss", &t.gear_loss}};
-    for (const auto& [name, values] : numbers) out[name] = array(*values, {count});
-    out["advance"] = array(t.advance, {count, n});
-    out["start"] = array(t.start, {count, n});
-    out["jacobian"] = array(t.jacobian, {count, n, n});
-    out["harmonics"] = array(t.harmonics, {count, c, static_cast<std::size_t>(spec.harmonics) + 1, 2});
-    out["mean_square"] = array(t.mean_square, {count, c});
-    if (spec.keep_table) out["table"] = array(t.table, {count, c, spec.samples});
+    for (const auto& [name, values] : numbers) out[name] = as_array(*values, {count});
+    out["advance"] = as_array(t.advance, {count, n});
+    out["start"] = as_array(t.start, {count, n});
+    out["jacobian"] = as_array(t.jacobian, {count, n, n});
+    out["harmonics"] = as_array(t.harmonics, {count, c, static_cast<std::size_t>(spec.harmonics) + 1, 2});
+    out["mean_square"] = as_array(t.mean_square, {count, c});
+    if (spec.keep_table) out["table"] = as_array(t.table, {count, c, spec.samples});
     return out;
 }
 

@@ -27,10 +27,8 @@ namespace lostmotion::binding {
 // Name, symbol, unit, meaning.
 using ChannelRow = std::tuple<std::string, std::string, std::string, std::string>;
 inline std::vector<ChannelRow> channel_rows(const std::vector<TrainChannel>& channels) {
-    std::vector<ChannelRow> rows;
-    for (const TrainChannel& c : channels)
-        rows.emplace_back(c.name, c.symbol, c.unit.empty() ? "1" : c.unit, c.meaning);
-    return rows;
+    const auto unit = [](const TrainChannel& c) { return c.unit.empty() ? "1" : c.unit; };
+    return rows_of(channels, &TrainChannel::name, &TrainChannel::symbol, unit, &TrainChannel::meaning);
 }
 
 // The same, and whether it follows from the others.
@@ -121,42 +119,18 @@ class TrainDescription : public model::TrainDescription {
         return other;
     }
     void add_motor(const std::string& name, const std::string& shaft, const Record& fields) {
-        model::ShaftMotor m;
-        m.name = name;
-        NamedFields named(fields);
-        m.law.describe(named);
-        m.describe(named);
-        named.refuse_unknown();
-        model::TrainDescription::add(std::move(m), shaft);
+        model::TrainDescription::add(with_law<model::ShaftMotor>(name, fields), shaft);
     }
     void add_gear(const std::string& name, const std::string& input, const std::string& output, const Record& fields) {
-        model::Gear g;
-        g.name = name;
-        NamedFields named(fields);
-        g.law.describe(named);
-        g.describe(named);
-        named.refuse_unknown();
-        model::TrainDescription::add(std::move(g), input, output);
+        model::TrainDescription::add(with_law<model::Gear>(name, fields), input, output);
     }
 
     void add(const std::string& table, const std::string& name, const std::string& shaft, const Record& fields) {
-        bool known = false;
-        model::Train::each_kind(train, [&](const char* own, const char*, const auto& elements) {
-            if (table != own) return;
-            known = true;
-            model::TrainDescription::add(made_for(elements, name, fields), shaft);
-        });
-        if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
+        add_on([&](auto&& use) { model::Train::each_kind(train, use); }, table, name, fields, shaft);
     }
     void add_coupling(const std::string& table, const std::string& name, const std::string& input,
                       const std::string& output, const Record& fields) {
-        bool known = false;
-        model::Train::each_coupling_kind(train, [&](const char* own, const char*, const auto& elements) {
-            if (table != own) return;
-            known = true;
-            model::TrainDescription::add(made_for(elements, name, fields), input, output);
-        });
-        if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
+        add_on([&](auto&& use) { model::Train::each_coupling_kind(train, use); }, table, name, fields, input, output);
     }
 
     void add_controller(const std::string& motor, const Record& fields) {
@@ -176,10 +150,8 @@ class TrainDescription : public model::TrainDescription {
     }
     // Shafts whose speeds follow from the balance of torques.
     std::vector<std::string> massless_shafts() const {
-        std::vector<std::string> names;
-        for (const int s : model::Places(train).massless)
-            names.push_back(train.shafts[static_cast<std::size_t>(s)].name);
-        return names;
+        return each_of(model::Places(train).massless,
+                       [&](int s) { return train.shafts[static_cast<std::size_t>(s)].name; });
     }
     // The states that move; a kernel may have a place for others, which are constant.
     std::vector<std::string> moving_states() const {
@@ -206,18 +178,15 @@ class TrainDescription : public model::TrainDescription {
         std::vector<double> data(all.size() * n);
         std::copy_n(channels.data(), all.channels() * n, data.begin());
         for (std::size_t k = 0; k < n; ++k) all.derive(data.data(), n, k);
-        auto out = std::make_unique_for_overwrite<double[]>(derived * n);
-        std::copy_n(data.begin() + static_cast<std::ptrdiff_t>(all.channels() * n), derived * n, out.get());
-        return as_array(std::move(out), {derived, n});
+        data.erase(data.begin(), data.begin() + static_cast<std::ptrdiff_t>(all.channels() * n));
+        return as_array(data, {derived, n});
     }
     void name_as(const std::vector<std::pair<std::string, std::string>>& aliases) {
         for (const auto& [name, shown] : aliases) train.aliases.push_back({name, shown});
     }
     // Also those that have an alias although there are none.
     std::vector<std::string> shown_contacts() const {
-        std::vector<std::string> names;
-        for (const model::ShownContact& c : model::shown_contacts(run()->assembly())) names.push_back(c.name);
-        return names;
+        return each_of(model::shown_contacts(run()->assembly()), &model::ShownContact::name);
     }
     std::vector<std::string> contact_names() const {
         const model::Assembly& a = run()->assembly();
@@ -243,17 +212,33 @@ class TrainDescription : public model::TrainDescription {
                                                                     const std::vector<double>& torques) const {
         const SteadyRegime r = lostmotion::steady_regime(train, {speeds, torques});
         const std::size_t n = r.states.size();
-        auto rate = std::make_unique_for_overwrite<double[]>(n * n);
-        std::copy(r.rate.begin(), r.rate.end(), rate.get());
-        return {r.states, as_array(std::move(rate), {n, n}), r.determined};
+        return {r.states, as_array(r.rate, {n, n}), r.determined};
     }
 
  private:
     template <class Element>
-    static Element made_for(const std::vector<Element>&, const std::string& name, const Record& fields) {
-        Element element = described<Element>(fields);
+    static Element with_law(const std::string& name, const Record& fields) {
+        Element element;
         element.name = name;
+        NamedFields named(fields);
+        element.law.describe(named);
+        element.describe(named);
+        named.refuse_unknown();
         return element;
+    }
+    // An element of one of these tables, on these shafts.
+    template <class Tables, class... Shafts>
+    void add_on(Tables&& tables, const std::string& table, const std::string& name, const Record& fields,
+                const Shafts&... shafts) {
+        bool known = false;
+        tables([&](const char* own, const char*, const auto& elements) {
+            if (table != own) return;
+            known = true;
+            auto element = described<typename std::decay_t<decltype(elements)>::value_type>(fields);
+            element.name = name;
+            model::TrainDescription::add(std::move(element), shafts...);
+        });
+        if (!known) throw nb::value_error(("there is no table '" + table + "'").c_str());
     }
     mutable std::shared_ptr<const SharedRun> run_;
 };

@@ -72,9 +72,11 @@ FMU_API int fmi3SetFloat64(void* c, const Reference* r, std::size_t n, const dou
     return n == n_values ? of(c).set_values(__func__, r, n, value) : of(c).failed("each variable has one value");
 }
 static int none(void* c, std::size_t n) { return of(c).none(n, "this FMU has variables of type Float64 alone"); }
-#define OTHER_TYPE(NAME, TYPE)                                                                                     \
-    FMU_API int fmi3Get##NAME(void* c, const Reference*, std::size_t n, TYPE*, std::size_t) { return none(c, n); } \
-    FMU_API int fmi3Set##NAME(void* c, const Reference*, std::size_t n, const TYPE*, std::size_t) { return none(c, n); }
+#define NONE(NAME, ...) \
+    FMU_API int fmi3##NAME(void* c, const Reference*, std::size_t n, __VA_ARGS__) { return none(c, n); }
+#define OTHER_TYPE(NAME, TYPE)          \
+    NONE(Get##NAME, TYPE*, std::size_t) \
+    NONE(Set##NAME, const TYPE*, std::size_t)
 OTHER_TYPE(Float32, float)
 OTHER_TYPE(Int8, std::int8_t)
 OTHER_TYPE(UInt8, std::uint8_t)
@@ -85,37 +87,22 @@ OTHER_TYPE(UInt32, std::uint32_t)
 OTHER_TYPE(Int64, std::int64_t)
 OTHER_TYPE(UInt64, std::uint64_t)
 OTHER_TYPE(Boolean, bool)
+NONE(GetString, const char**, std::size_t)
+NONE(SetString, const char* const*, std::size_t)
+NONE(GetBinary, std::size_t*, const std::uint8_t**, std::size_t)
+NONE(SetBinary, const std::size_t*, const std::uint8_t* const*, std::size_t)
+NONE(GetClock, bool*)
+NONE(SetClock, const bool*)
+NONE(GetIntervalDecimal, double*, int*)
+NONE(GetIntervalFraction, std::uint64_t*, std::uint64_t*, int*)
+NONE(GetShiftDecimal, double*)
+NONE(GetShiftFraction, std::uint64_t*, std::uint64_t*)
+NONE(SetIntervalDecimal, const double*)
+NONE(SetIntervalFraction, const std::uint64_t*, const std::uint64_t*)
+NONE(SetShiftDecimal, const double*)
+NONE(SetShiftFraction, const std::uint64_t*, const std::uint64_t*)
 #undef OTHER_TYPE
-FMU_API int fmi3GetString(void* c, const Reference*, std::size_t n, const char**, std::size_t) { return none(c, n); }
-FMU_API int fmi3SetString(void* c, const Reference*, std::size_t n, const char* const*, std::size_t) {
-    return none(c, n);
-}
-FMU_API int fmi3GetBinary(void* c, const Reference*, std::size_t n, std::size_t*, const std::uint8_t**, std::size_t) {
-    return none(c, n);
-}
-FMU_API int fmi3SetBinary(void* c, const Reference*, std::size_t n, const std::size_t*, const std::uint8_t* const*,
-                          std::size_t) {
-    return none(c, n);
-}
-FMU_API int fmi3GetClock(void* c, const Reference*, std::size_t n, bool*) { return none(c, n); }
-FMU_API int fmi3SetClock(void* c, const Reference*, std::size_t n, const bool*) { return none(c, n); }
-FMU_API int fmi3GetIntervalDecimal(void* c, const Reference*, std::size_t n, double*, int*) { return none(c, n); }
-FMU_API int fmi3GetIntervalFraction(void* c, const Reference*, std::size_t n, std::uint64_t*, std::uint64_t*, int*) {
-    return none(c, n);
-}
-FMU_API int fmi3GetShiftDecimal(void* c, const Reference*, std::size_t n, double*) { return none(c, n); }
-FMU_API int fmi3GetShiftFraction(void* c, const Reference*, std::size_t n, std::uint64_t*, std::uint64_t*) {
-    return none(c, n);
-}
-FMU_API int fmi3SetIntervalDecimal(void* c, const Reference*, std::size_t n, const double*) { return none(c, n); }
-FMU_API int fmi3SetIntervalFraction(void* c, const Reference*, std::size_t n, const std::uint64_t*,
-                                    const std::uint64_t*) {
-    return none(c, n);
-}
-FMU_API int fmi3SetShiftDecimal(void* c, const Reference*, std::size_t n, const double*) { return none(c, n); }
-FMU_API int fmi3SetShiftFraction(void* c, const Reference*, std::size_t n, const std::uint64_t*, const std::uint64_t*) {
-    return none(c, n);
-}
+#undef NONE
 FMU_API int fmi3ActivateModelPartition(void* c, Reference, double) { return of(c).failed("this FMU has no clocks"); }
 FMU_API int fmi3GetNumberOfVariableDependencies(void* c, Reference, std::size_t*) {
     return of(c).failed("dependencies are those of modelDescription.xml");

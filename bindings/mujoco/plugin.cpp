@@ -215,25 +215,6 @@ void place(Drive& drive, double* state, double speed, double angle) {
 
 void reset(const mjModel*, mjtNum* state, void* data, int) { place(*static_cast<Drive*>(data), state, 0.0, 0.0); }
 
-// Advances the drive from its state, against the load torque that solves an equation. equation(L, answer): its residual
-// over what rounding leaves, and the change of L by Newton's method; 0 where nothing can be done.
-template <class Equation>
-void solve(const mjModel* m, const mjData* d, int instance, double load, Equation&& equation) {
-    Drive& drive = drive_of(d, instance);
-    std::ranges::fill(drive.inputs, given(m, d, drive));
-    for (int n = 0;; ++n) {
-        if (!drive.simulation.set_state(d->plugin_state + m->plugin_stateadr[instance]))
-            fail(m, instance, "plugin_state is not that of this drive");
-        drive.inputs[drive.load] = load;
-        const lm::Status status =
-            drive.simulation.answer(m->opt.timestep, drive.inputs, drive.inputs, drive.joint.shaft, drive.answer);
-        if (status != lm::Status::done) fail(m, instance, drive.simulation.text(status));
-        const auto [residual, change] = equation(load, drive.answer);
-        if (std::fabs(residual) <= 1e-11 || change == 0.0 || n == most_iterations) return;
-        load += change;
-    }
-}
-
 // The inverse of a symmetric positive definite matrix, in its place.
 void invert(std::vector<double>& a, std::size_t n) {
     for (std::size_t k = 0; k < n; ++k) {
@@ -329,17 +310,23 @@ void compute(const mjModel* m, mjData* d, int instance, int) {
     }
 }
 
+// Advances the drive from its state, against the load torque by which the joint has the speed that the engine gave it.
 void advance(const mjModel* m, mjData* d, int instance) {
     Drive& drive = drive_of(d, instance);
     double* state = d->plugin_state + m->plugin_stateadr[instance];
-    const double speed = d->qvel[drive.dof], before = state[drive.numbers + 1];
+    const double speed = d->qvel[drive.dof], scale = std::fabs(speed) + std::fabs(state[drive.numbers + 1]) + 1e-9;
     double load = state[drive.numbers];
-    solve(m, d, instance, load, [&](double tried, const lm::LoadAnswer& a) {
-        load = tried;
-        const double off = drive.speed() - speed;
-        return std::pair(off / (std::fabs(speed) + std::fabs(before) + 1e-9),
-                         a.compliance > 0.0 ? off / (m->opt.timestep * a.compliance) : 0.0);
-    });
+    std::ranges::fill(drive.inputs, given(m, d, drive));
+    for (int n = 0;; ++n) {
+        if (!drive.simulation.set_state(state)) fail(m, instance, "plugin_state is not that of this drive");
+        drive.inputs[drive.load] = load;
+        const lm::Status status =
+            drive.simulation.answer(m->opt.timestep, drive.inputs, drive.inputs, drive.joint.shaft, drive.answer);
+        if (status != lm::Status::done) fail(m, instance, drive.simulation.text(status));
+        const double off = drive.speed() - speed, compliance = drive.answer.compliance;
+        if (std::fabs(off / scale) <= 1e-11 || !(compliance > 0.0) || n == most_iterations) break;
+        load += off / (m->opt.timestep * compliance);
+    }
     drive.simulation.get_state(state);
     state[drive.numbers] = load;
     state[drive.numbers + 1] = speed;

@@ -462,6 +462,17 @@ class ExactBatchSnapshot:
 class ExactBatch:
     def __init__(self, trains: Sequence[Train], *, controls: Sequence[tuple[float, Sequence[Axis]]], kind_of: Sequence[int], step: float) -> None: ...
 
+    @property
+    def variables(self) -> list[str]: ...
+
+    def snapshot(self) -> ExactBatchSnapshot: ...
+
+    def restore(self, snapshot: ExactBatchSnapshot) -> None: ...
+
+    @property
+    def memory(self) -> int:
+        """Bytes, without what the solvers keep of the regimes."""
+
     def step(self, inputs: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]], *, speed: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, angle: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, acceleration: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)] | None = None, threads: int) -> None: ...
 
     def answer(self, inputs: Sequence[Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]], *, shaft: int, load: int, threads: int) -> NDArray[numpy.float64]:
@@ -481,25 +492,25 @@ class ExactBatch:
     def states(self) -> list[str]: ...
 
     @property
-    def variables(self) -> list[str]: ...
-
-    @property
     def values(self) -> Annotated[NDArray[numpy.float64], dict(shape=(None, None))]:
         """The values of all drives, by variable; each step writes them anew."""
-
-    def snapshot(self) -> ExactBatchSnapshot: ...
-
-    def restore(self, snapshot: ExactBatchSnapshot) -> None: ...
-
-    @property
-    def memory(self) -> int:
-        """Bytes, without what the solvers keep of the regimes."""
 
 class BatchSnapshot:
     pass
 
 class DriveBatch:
     def __init__(self, trains: Sequence[Train], *, controls: Sequence[tuple[float, Sequence[Axis]]], kind_of: Sequence[int], step: float) -> None: ...
+
+    @property
+    def variables(self) -> list[str]: ...
+
+    def snapshot(self) -> BatchSnapshot: ...
+
+    def restore(self, snapshot: BatchSnapshot) -> None: ...
+
+    @property
+    def memory(self) -> int:
+        """Bytes of states and parameters."""
 
     def set(self, key: str, values: Annotated[NDArray[numpy.float64], dict(shape=(None,), order='C', device='cpu', writable=False)]) -> None:
         """Sets a parameter of all drives, by its key in the short form."""
@@ -541,9 +552,6 @@ class DriveBatch:
     @property
     def inputs(self) -> list[str]: ...
 
-    @property
-    def variables(self) -> list[str]: ...
-
     def read(self, variable: int) -> NDArray[numpy.float64]:
         """The values of a variable, by its number among the names."""
 
@@ -552,16 +560,8 @@ class DriveBatch:
 
     def tangent(self, parameter: int, state: int) -> NDArray[numpy.float64]: ...
 
-    def snapshot(self) -> BatchSnapshot: ...
-
-    def restore(self, snapshot: BatchSnapshot) -> None: ...
-
     @property
     def counts(self) -> tuple[int, int, int, int]: ...
-
-    @property
-    def memory(self) -> int:
-        """Bytes of states and parameters."""
 
 def respond(train: Train, points: Sequence[tuple[Sequence[Signal], float, Mapping[str, float]]], *, samples: int, harmonics: int, max_periods: int, tolerance: float, keep_table: bool, limit_cycle: bool, threads: int, progress: object | None = None) -> dict[str, Any]: ...
 

@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <limits>
-#include <span>
 #include <utility>
 
 #include "../model/drive_train.hpp"
@@ -34,6 +33,29 @@ void set_gap(model::Train& train, double half_gap) {
 }
 
 auto& at(auto& list, int place) { return list[static_cast<std::size_t>(place)]; }
+
+// use(number, number of the drive, sign): what the general solver has in the place of a number of a drive. turned: -1
+// where the output turns against the input.
+template <class Use>
+void each_number(const model::Assembly& a, int turned, MotionState& s, DriveState& x, Use&& use) {
+    const model::Places& places = a.places();
+    const model::GearPlace& gear = places.gears[0];
+    const auto in = [&](auto& list, int place, auto& number, int sign = 1) {
+        if (place != model::nowhere) use(at(list, place), number, sign);
+    };
+    in(s.x, places.motors[0].torque, x.q, turned);
+    in(s.x, gear.twist, x.d);
+    in(s.x, a.layout().coupled, x.angle);
+    in(s.memory, gear.hysteresis, x.hysteresis);
+    if (gear.contact != model::nowhere) in(s.memory, at(places.contacts, gear.contact).locked, x.held);
+    if (!x.known) return;
+    in(s.key.modes, places.shafts[0].contact, x.motor, turned);
+    in(s.key.modes, gear.contact, x.twist);
+    in(s.key.modes, places.shafts[1].contact, x.load);
+    in(s.key.branch, gear.flanks, x.flanks);
+    in(s.key.branch, gear.cell, x.cell);
+    in(s.key.branch, gear.cell_back, x.back);
+}
 
 }  // namespace
 
@@ -196,9 +218,10 @@ DriveBatch::Worker& DriveBatch::add_worker() {
 
 void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                             LoadAnswer* answers, Worker& worker) {
+    DriveState from{};  // of a drive whose tangents are carried along
     for (std::size_t k = begin; k < end; ++k) {
         ++worker.counts.steps;
-        const DriveState from = drives_[k];
+        if (!slopes_.empty()) from = drives_[k];
         LoadAnswer* const answer = answers == nullptr ? nullptr : answers + k;
         // The answer of a controller to what its encoders read is that of the general solver.
         const bool walked = !controlled()
@@ -340,11 +363,9 @@ void DriveBatch::give_state(std::size_t k, ScenarioSimulation& simulation, Worke
     const model::Layout& n = a.layout();
     const model::Places& places = a.places();
     const model::GearPlace& gear = places.gears[0];
-    const model::ShaftPlace &first = places.shafts[0], &last = places.shafts[1];
     const DriveNumbers& p = numbers(k);
-    const int torque = places.motors[0].torque, limit = places.motors[0].branch, zero = kind(k).laws().zero;
-    const int locked = gear.contact == model::nowhere ? model::nowhere : at(places.contacts, gear.contact).locked;
-    const DriveState& x = drives_[k];
+    const int limit = places.motors[0].branch;
+    DriveState x = drives_[k];
     MotionState& s = worker.state;
     s.clear();
     s.time = times_[k];
@@ -356,29 +377,22 @@ void DriveBatch::give_state(std::size_t k, ScenarioSimulation& simulation, Worke
     if (instants_[k] > 0)
         s.control.slots.assign(slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k]),
                                slots_.begin() + static_cast<std::ptrdiff_t>(slots_at_[k + 1]));
-    if (torque != model::nowhere) at(s.x, torque) = p.turned * x.q;
-    at(s.x, first.speed) = ratio(k) * x.a;
-    at(s.x, last.speed) = x.a - x.v;
-    if (gear.twist != model::nowhere) at(s.x, gear.twist) = x.d;
-    at(s.x, n.coupled) = x.angle;
-    if (gear.hysteresis != model::nowhere) at(s.memory, gear.hysteresis) = x.hysteresis;
-    if (locked != model::nowhere) at(s.memory, locked) = x.held;
+    each_number(a, p.turned, s, x, [](auto& there, auto here, int sign) {
+        there = static_cast<std::decay_t<decltype(there)>>(sign * here);
+    });
+    at(s.x, places.shafts[0].speed) = ratio(k) * x.a;
+    at(s.x, places.shafts[1].speed) = x.a - x.v;
     s.started = x.known;
     if (x.known) {
-        if (first.contact != model::nowhere)
-            at(s.key.modes, first.contact) = static_cast<std::int8_t>(p.turned * x.motor);
-        if (gear.contact != model::nowhere) at(s.key.modes, gear.contact) = x.twist;
-        if (last.contact != model::nowhere) at(s.key.modes, last.contact) = x.load;
-        if (gear.piece != model::nowhere) at(s.key.branch, gear.piece) = static_cast<std::int16_t>(x.piece - zero);
-        if (gear.flanks != model::nowhere) at(s.key.branch, gear.flanks) = x.flanks;
-        if (gear.cell != model::nowhere) at(s.key.branch, gear.cell) = x.cell;
-        if (gear.cell_back != model::nowhere) at(s.key.branch, gear.cell_back) = x.back;
+        if (gear.piece != model::nowhere)
+            at(s.key.branch, gear.piece) = static_cast<std::int16_t>(x.piece - kind(k).laws().zero);
         if (limit != model::nowhere)
             at(s.key.branch, limit) = static_cast<std::int16_t>(inputs_[2 * k] > p.command_limit) -
                                       static_cast<std::int16_t>(inputs_[2 * k] < -p.command_limit);
         s.rate_input = s.input;
-    } else if (locked != model::nowhere && gear.twist != model::nowhere) {
-        at(s.memory, locked) = a.train().gears[0].law.curve.torque(x.d);
+    } else if (gear.contact != model::nowhere && gear.twist != model::nowhere) {
+        if (const int locked = at(places.contacts, gear.contact).locked; locked != model::nowhere)
+            at(s.memory, locked) = a.train().gears[0].law.curve.torque(x.d);
     }
     simulation.motion().restore(s);
 }
@@ -396,30 +410,19 @@ bool DriveBatch::solve(std::size_t k, double command, double load_torque, LoadAn
         worker.failure.add({k, simulation.text(status)});
         return false;
     }
-    const model::Places& places = simulation.train().assembly().places();
+    const model::Assembly& a = simulation.train().assembly();
+    const model::Places& places = a.places();
     const model::GearPlace& gear = places.gears[0];
-    const model::ShaftPlace &first = places.shafts[0], &last = places.shafts[1];
-    const int torque = places.motors[0].torque;
-    const int locked = gear.contact == model::nowhere ? model::nowhere : at(places.contacts, gear.contact).locked;
-    const DriveNumbers& p = numbers(k);
     DriveState& x = drives_[k];
     MotionState& s = worker.state;
     simulation.motion().save(s);
-    if (torque != model::nowhere) x.q = p.turned * at(s.x, torque);
-    x.a = at(s.x, first.speed) / ratio(k);
-    x.v = x.a - at(s.x, last.speed);
-    if (gear.twist != model::nowhere) x.d = at(s.x, gear.twist);
-    x.angle = at(s.x, simulation.train().assembly().layout().coupled);
-    if (gear.hysteresis != model::nowhere) x.hysteresis = at(s.memory, gear.hysteresis);
-    if (locked != model::nowhere) x.held = at(s.memory, locked);
     x.known = true;
-    if (first.contact != model::nowhere) x.motor = static_cast<signed char>(p.turned * at(s.key.modes, first.contact));
-    if (gear.contact != model::nowhere) x.twist = at(s.key.modes, gear.contact);
-    if (last.contact != model::nowhere) x.load = at(s.key.modes, last.contact);
+    each_number(a, numbers(k).turned, s, x, [](auto there, auto& here, int sign) {
+        here = static_cast<std::decay_t<decltype(here)>>(sign * there);
+    });
+    x.a = at(s.x, places.shafts[0].speed) / ratio(k);
+    x.v = x.a - at(s.x, places.shafts[1].speed);
     if (gear.piece != model::nowhere) x.piece = static_cast<short>(at(s.key.branch, gear.piece) + kind(k).laws().zero);
-    if (gear.flanks != model::nowhere) x.flanks = static_cast<signed char>(at(s.key.branch, gear.flanks));
-    if (gear.cell != model::nowhere) x.cell = at(s.key.branch, gear.cell);
-    if (gear.cell_back != model::nowhere) x.back = at(s.key.branch, gear.cell_back);
     if (gear.contact != model::nowhere && x.twist == 0) x.v = 0.0;
     inputs_[2 * k] = controlled() ? s.input[0] : command;
     instants_[k] = s.control.next;
