@@ -27,8 +27,7 @@ class ActuatorSheet(Record):
     ratio: Annotated[Number, Positive]
     rotor_inertia: Annotated[Inertia, Positive] | None = None
     """inertia of the rotor, and of the gearbox where the sheet adds it, at the motor"""
-    rated_output_torque: Annotated[Torque, Positive] | None = None
-    """continuous"""
+    rated_output_torque: Annotated[Torque, Positive] | None = None  #: continuous
     peak_output_torque: Annotated[Torque, Positive] | None = None
     rated_output_speed: Annotated[Speed, Positive] | None = None
     no_load_output_speed: Annotated[Speed, Positive] | None = None

@@ -74,24 +74,18 @@ class GearboxSheet(GearboxLoads, Record):
     """Data sheet of a gearbox."""
 
     kind: Literal["strain_wave", "planetary", "worm", "cycloidal", "other"]
-    ratio: Annotated[Number, Positive]
-    """input speed / output speed"""
+    ratio: Annotated[Number, Positive]  #: input speed / output speed
     rated_output_torque: Annotated[Torque, Positive] | None = None
-    rated_input_speed: Annotated[Speed, Positive] | None = None
-    """at which the rated torque and the efficiency hold"""
-    inertia: Annotated[Inertia, NotNegative] | None = None
-    """on the input shaft"""
-    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0
-    """on the input shaft, beside the losses"""
+    rated_input_speed: Annotated[Speed, Positive] | None = None  #: at which the rated torque and the efficiency hold
+    inertia: Annotated[Inertia, NotNegative] | None = None  #: on the input shaft
+    viscous_friction: Annotated[ViscousFriction, NotNegative] = 0.0  #: on the input shaft, beside the losses
     stiffness: StiffnessData | None = None
     rigid: Switch = False
     """without any twist, so that there is no stiffness: of a gear that was identified, or is taken, as such"""
-    backlash: Annotated[Angle, NotNegative] | None = None
-    """total gap at the output"""
+    backlash: Annotated[Angle, NotNegative] | None = None  #: total gap at the output
     hysteresis_loss: Annotated[Angle, Positive] | None = None
     """width of the loop at zero torque after loading to rated torque in both directions"""
-    hysteresis_efficiency: Efficiency | None = None
-    """eta_H of (16), where the loop itself is known"""
+    hysteresis_efficiency: Efficiency | None = None  #: eta_H of (16), where the loop itself is known
     losses: LossData = LossData()
 
     @model_validator(mode="before")

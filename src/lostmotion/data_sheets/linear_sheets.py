@@ -120,12 +120,9 @@ class RackSheet(LinearSheet, RatedRack):
 
     kind: Literal["straight", "helical"] = "straight"
     pressure_angle: Annotated[Angle, Positive] | None = None
-    width: Annotated[Length, Positive] | None = None
-    """width of the bar, across the teeth"""
-    height: Annotated[Length, Positive] | None = None
-    """height of the bar, from its back to the tips of the teeth"""
-    pitch_line_height: Annotated[Length, Positive] | None = None
-    """from the back of the bar to the pitch line"""
+    width: Annotated[Length, Positive] | None = None  #: width of the bar, across the teeth
+    height: Annotated[Length, Positive] | None = None  #: height of the bar, from its back to the tips of the teeth
+    pitch_line_height: Annotated[Length, Positive] | None = None  #: from the back of the bar to the pitch line
     bar_length: Annotated[Length, Positive] | None = None
     bar_teeth: Annotated[Whole, Positive] | None = None
     bar_mass: Annotated[Mass, Positive] | None = None
@@ -182,14 +179,11 @@ class LinearMotorSheet(LinearSheet, LinearMotorData):
     """
 
     kind: Literal["ironcore", "ironless", "tubular", "voice_coil"] = "ironcore"
-    resistance: Annotated[Resistance, Positive] | None = None
-    """between two terminals, at 25 °C"""
-    inductance: Annotated[Inductance, Positive] | None = None
-    """between two terminals"""
+    resistance: Annotated[Resistance, Positive] | None = None  #: between two terminals, at 25 °C
+    inductance: Annotated[Inductance, Positive] | None = None  #: between two terminals
     voltage_constant: Annotated[LinearVoltageConstant, Positive] | None = None
     """amplitude of the voltage between two terminals to the speed"""
-    attraction_force: Annotated[Force, Positive] | None = None
-    """between coils and magnets"""
+    attraction_force: Annotated[Force, Positive] | None = None  #: between coils and magnets
     max_dissipation: Annotated[Power, Positive] | None = None
     dc_voltage: Annotated[Voltage, Positive] | None = None
     max_speed: Annotated[LinearSpeed, Positive] | None = None

@@ -37,10 +37,8 @@ class BuiltMap:
     """A loss map, with notes on its data."""
 
     losses: LossMap
-    origin: tuple[tuple[str, ...], ...]
-    """origin of each value, in the shape of `losses.values`"""
-    notes: tuple[str, ...] = ()
-    """contradictions and assumptions, one sentence each"""
+    origin: tuple[tuple[str, ...], ...]  #: origin of each value, in the shape of `losses.values`
+    notes: tuple[str, ...] = ()  #: contradictions and assumptions, one sentence each
 
 
 @checked

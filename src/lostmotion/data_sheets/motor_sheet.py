@@ -45,40 +45,29 @@ class MotorSheet(MotorHeat, Record):
     rated_torque: Annotated[Torque, Positive] | None = None
     """at the shaft, continuous; with armature_voltage_constant that of the field"""
     rated_speed: Annotated[Speed, Positive] | None = None
-    peak_torque: Annotated[Torque, Positive] | None = None
-    """at the shaft, for seconds, as in acceleration"""
+    peak_torque: Annotated[Torque, Positive] | None = None  #: at the shaft, for seconds, as in acceleration
     rated_current: Annotated[Current, Positive] | None = None
     no_load_speed: Annotated[Speed, Positive] | None = None
     no_load_current: Annotated[Current, Positive] | None = None
     stall_torque: Annotated[Torque, Positive] | None = None
     stall_current: Annotated[Current, Positive] | None = None
     torque_constant: Annotated[TorqueConstant, Positive] | None = None
-    resistance: Annotated[Resistance, Positive] | None = None
-    """terminal, at 25 °C"""
+    resistance: Annotated[Resistance, Positive] | None = None  #: terminal, at 25 °C
     inductance: Annotated[Inductance, Positive] | None = None
-    pole_pairs: Annotated[Whole, Field(gt=0)] | None = None
-    """pole pairs of a brushless motor"""
-    winding: Winding | None = None
-    """winding of a synchronous motor"""
-    dc_voltage: Annotated[Voltage, Positive] | None = None
-    """dc voltage of the amplifier of a synchronous motor"""
+    pole_pairs: Annotated[Whole, Field(gt=0)] | None = None  #: pole pairs of a brushless motor
+    winding: Winding | None = None  #: winding of a synchronous motor
+    dc_voltage: Annotated[Voltage, Positive] | None = None  #: dc voltage of the amplifier of a synchronous motor
     friction_torque: Annotated[Torque, NotNegative] | None = None
-    armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None
-    """k_N, where it is known itself"""
+    armature_voltage_constant: Annotated[Number, Limit(gt=1.0)] | None = None  #: k_N, where it is known itself
     electrical_time_constant: Annotated[Time, Positive] | None = None
     max_speed: Annotated[Speed, Positive] | None = None
     max_inertia_ratio: Annotated[Number, Positive] | None = None
     """largest inertia of the load relative to the rotor's inertia"""
-    steps_per_revolution: Annotated[Number, Positive] | None = None
-    """full steps of a stepper"""
-    holding_torque: Annotated[Torque, Positive] | None = None
-    """of a stepper, with rated_current in both phases"""
-    detent_torque: Annotated[Torque, NotNegative] | None = None
-    """of a stepper without current"""
-    resistance_phase: Annotated[Resistance, Positive] | None = None
-    """of a phase of a stepper"""
-    inductance_phase: Annotated[Inductance, Positive] | None = None
-    """of a phase of a stepper"""
+    steps_per_revolution: Annotated[Number, Positive] | None = None  #: full steps of a stepper
+    holding_torque: Annotated[Torque, Positive] | None = None  #: of a stepper, with rated_current in both phases
+    detent_torque: Annotated[Torque, NotNegative] | None = None  #: of a stepper without current
+    resistance_phase: Annotated[Resistance, Positive] | None = None  #: of a phase of a stepper
+    inductance_phase: Annotated[Inductance, Positive] | None = None  #: of a phase of a stepper
 
     @model_validator(mode="after")
     def _fits_kind(self) -> Self:

@@ -22,8 +22,7 @@ def in_lower_case(name: Any) -> Any:
 class Source(Part):
     """Origin of data: their status, and the text that contains them."""
 
-    data: tuple[str, ...]
-    """keys of the record that it covers"""
+    data: tuple[str, ...]  #: keys of the record that it covers
     status: Literal["manufacturer", "transcription", "inferred", "identified"]
     """read in the manufacturer's own text, transcribed by somebody else, concluded from other data, or identified from measured logs"""
     text: str

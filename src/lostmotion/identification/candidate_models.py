@@ -47,14 +47,10 @@ class RungResult:
     name: str
     fit: Fit
     errors: list[LogError]
-    train: float
-    """mean absolute error in units of the deviations, or SI of the only channel"""
-    held_out: float
-    """the same of the logs held out that have a run; NaN without such"""
-    failed: dict[str, str]
-    """reason by log held out, where it has no run with the values of this model"""
-    undetermined: list[Undetermined]
-    """unidentifiable parameters of this model"""
+    train: float  #: mean absolute error in units of the deviations, or SI of the only channel
+    held_out: float  #: the same of the logs held out that have a run; NaN without such
+    failed: dict[str, str]  #: reason by log held out, where it has no run with the values of this model
+    undetermined: list[Undetermined]  #: unidentifiable parameters of this model
     minima: list[ParameterPoint] = field(default_factory=list)
     """other minima of the cost that these logs do not tell from the one found"""
 

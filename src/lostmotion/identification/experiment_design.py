@@ -26,10 +26,8 @@ class Candidate:
     """An experiment with its information about the parameters, in addition to the existing logs."""
 
     name: str
-    gain: float
-    """information on all parameters in nats: half the change of the log-determinant of the information"""
-    widths: dict[str, float]
-    """by parameter, width of its interval after it over that before"""
+    gain: float  #: information on all parameters in nats: half the change of the log-determinant of the information
+    widths: dict[str, float]  #: by parameter, width of its interval after it over that before
 
 
 @checked

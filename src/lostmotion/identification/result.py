@@ -33,20 +33,13 @@ class IdentificationResult:
     """Values, intervals and errors of an identification, with the unidentifiable parameters."""
 
     task: Identification
-    rungs: list[RungResult]
-    """candidate models, from the first"""
-    chosen: int
-    """index of the chosen model"""
-    intervals: dict[str, Interval]
-    """95 % intervals of the parameters, SI"""
-    undetermined: list[Undetermined]
-    """unidentifiable parameters"""
-    at_bounds: list[str]
-    """parameters that have ended at a bound"""
-    notes: dict[str, tuple[str, ...]]
-    """by log: notes on dropped samples, and on what looks wrong"""
-    left_out: dict[str, str] = field(default_factory=dict, kw_only=True)
-    """by log that cannot be used: why"""
+    rungs: list[RungResult]  #: candidate models, from the first
+    chosen: int  #: index of the chosen model
+    intervals: dict[str, Interval]  #: 95 % intervals of the parameters, SI
+    undetermined: list[Undetermined]  #: unidentifiable parameters
+    at_bounds: list[str]  #: parameters that have ended at a bound
+    notes: dict[str, tuple[str, ...]]  #: by log: notes on dropped samples, and on what looks wrong
+    left_out: dict[str, str] = field(default_factory=dict, kw_only=True)  #: by log that cannot be used: why
     inputs: list[str] = field(default_factory=list, kw_only=True)
     """course of inputs between samples, if the task leaves it open, with the reason"""
     misfits: list[Misfit] = field(default_factory=list, kw_only=True)
@@ -59,16 +52,14 @@ class IdentificationResult:
     """faults that several logs share, which are the model's"""
     kinds: list[KindError] = field(default_factory=list, kw_only=True)
     """errors of the logs by the values of their headers"""
-    scenario: Scenario
-    """the rig with the values that were found, of the first log"""
+    scenario: Scenario  #: the rig with the values that were found, of the first log
     profiles: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     """by parameter, (value, rise of the loss)"""
     by_differences: dict[str, str] = field(default_factory=dict)
     """parameters whose derivatives were differences of runs, not exact: why"""
     touching: dict[str, str] = field(default_factory=dict)
     """logs whose derivatives were so from some instant on, at the values found: why"""
-    start: Regression = field(default_factory=Regression)
-    """start of the search"""
+    start: Regression = field(default_factory=Regression)  #: start of the search
     rig: Rig | None = field(default=None, repr=False)
     logs: list[Prepared] = field(default_factory=list, repr=False)
 

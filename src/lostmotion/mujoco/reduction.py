@@ -27,20 +27,13 @@ FASTEST_SHARE = 0.1  # Bandwidth of the loop that makes the motion, over the nat
 class Reduction:
     """Best description of a drive in MuJoCo for one motion."""
 
-    armature: float
-    """inertia of the drive at the joint [kg·m²], at a slide its mass [kg]"""
-    damping: float
-    """[N·m·s/rad], at a slide [N·s/m]"""
-    frictionloss: float
-    """[N·m] or [N]"""
-    gear: float
-    """torque or force on the joint over torque of the motor"""
-    torque_error: float
-    """root mean square [N·m] or [N] of what this leaves of the torque or force on the joint"""
-    torque: float
-    """root mean square of the torque [N·m] or force [N] on the joint"""
-    slides: bool = False
-    """whether the joint is a slide"""
+    armature: float  #: inertia of the drive at the joint [kg·m²], at a slide its mass [kg]
+    damping: float  #: [N·m·s/rad], at a slide [N·s/m]
+    frictionloss: float  #: [N·m] or [N]
+    gear: float  #: torque or force on the joint over torque of the motor
+    torque_error: float  #: root mean square [N·m] or [N] of what this leaves of the torque or force on the joint
+    torque: float  #: root mean square of the torque [N·m] or force [N] on the joint
+    slides: bool = False  #: whether the joint is a slide
 
     @property
     def error(self) -> float:

@@ -28,19 +28,15 @@ class RigReport:
     """Measurements of one gearbox."""
 
     gearbox: Gearbox
-    map: xarray.Dataset
-    """efficiency and loss torque, motor driving"""
-    no_load: tuple[Any, Any]
-    """input speeds [rad/s], torques [N·m]"""
+    map: xarray.Dataset  #: efficiency and loss torque, motor driving
+    no_load: tuple[Any, Any]  #: input speeds [rad/s], torques [N·m]
     initial_loading: tuple[Any, Any] | None
     """twist [rad], torque [N·m] of the first loading; none of a rigid gearbox, which has no twist"""
-    loops: tuple[Loop, ...]
-    """at falling amplitudes, the largest at rated torque; none of a rigid gearbox"""
+    loops: tuple[Loop, ...]  #: at falling amplitudes, the largest at rated torque; none of a rigid gearbox
     starting_torque: float
     backdriving_torque: float | None
     lost_motion: float
-    overrunning: Overrunning
-    """at rated load and speed: whether it locks, by its losses"""
+    overrunning: Overrunning  #: at rated load and speed: whether it locks, by its losses
     comparisons: tuple[Comparison, ...] = field(default=())
 
 

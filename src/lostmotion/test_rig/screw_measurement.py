@@ -32,26 +32,17 @@ class ScrewReport:
     """Measurements of one screw."""
 
     screw: ScrewData
-    load: float
-    """axial force that they refer to [N]"""
+    load: float  #: axial force that they refer to [N]
     efficiency: tuple[Any, Any, Any]
     """shares of the load, efficiency of the thread while the input drives, and while the slide does"""
-    drag: tuple[Any, Any]
-    """speeds of the screw [rad/s], torques without a load [N·m]"""
-    first_loading: tuple[Any, Any] | None
-    """deflection [m], force [N]; none of a rigid screw"""
-    loops: tuple[Loop, ...]
-    """deflection [m] over force [N] at falling amplitudes; none of a rigid screw"""
-    stiffness: tuple[float, ...]
-    """axial [N/m], of each segment; none of a rigid screw"""
-    lost_motion: float
-    """[m], at 3 % of the load"""
-    pitch_error: float
-    """[m], from peak to peak over a turn"""
-    starting_torque: float
-    """on the input against the load [N·m]"""
-    backdriving_force: float | None
-    """on the slide with a free input [N]; none: self-locking"""
+    drag: tuple[Any, Any]  #: speeds of the screw [rad/s], torques without a load [N·m]
+    first_loading: tuple[Any, Any] | None  #: deflection [m], force [N]; none of a rigid screw
+    loops: tuple[Loop, ...]  #: deflection [m] over force [N] at falling amplitudes; none of a rigid screw
+    stiffness: tuple[float, ...]  #: axial [N/m], of each segment; none of a rigid screw
+    lost_motion: float  #: [m], at 3 % of the load
+    pitch_error: float  #: [m], from peak to peak over a turn
+    starting_torque: float  #: on the input against the load [N·m]
+    backdriving_force: float | None  #: on the slide with a free input [N]; none: self-locking
     comparisons: tuple[Comparison, ...] = ()
 
     def drag_at(self, speed: float) -> float:

@@ -50,8 +50,7 @@ LIMIT = 1e30  # in place of infinity, which single precision has, too, but compi
 
 TOLD = ("load_torque", "speed", "per_torque", "command", "angle")
 """what an engine was told before a step: load torque and the speed that it leads to, with its derivative; the inputs of the law"""
-MOST_ARMATURE = 1e4
-"""what an engine is told of a joint that friction holds, over the inertia of the joint"""
+MOST_ARMATURE = 1e4  # what an engine is told of a joint that friction holds, over the inertia of the joint
 START = """
     typedef {real} real;
     constexpr real ROUNDING = real({epsilon});

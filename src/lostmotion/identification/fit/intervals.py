@@ -23,10 +23,8 @@ class Interval:
 
     low: float
     high: float
-    method: str
-    """``bootstrap`` or ``profile``; ``bounds``, where the fit says nothing of the value"""
-    flag: str = ""
-    """why the interval may miss the value: the structure of the residuals; empty if these are noise"""
+    method: str  #: ``bootstrap`` or ``profile``; ``bounds``, where the fit says nothing of the value
+    flag: str = ""  #: why the interval may miss the value: the structure of the residuals; empty if these are noise
 
 
 def bootstrap(problem: FitProblem, fit: Fit, seed: int = 0, hidden: float = 0.0) -> dict[str, Interval]:

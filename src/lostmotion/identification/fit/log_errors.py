@@ -17,12 +17,9 @@ class LogError:
     log: str
     channel: str
     held_out: bool
-    mae: float
-    """mean absolute error, SI"""
-    rmse: float
-    """root mean square error, SI"""
-    fit: float
-    """1 - rmse/standard deviation of what was measured: 1 is perfect"""
+    mae: float  #: mean absolute error, SI
+    rmse: float  #: root mean square error, SI
+    fit: float  #: 1 - rmse/standard deviation of what was measured: 1 is perfect
     samples: int
 
 

@@ -54,25 +54,18 @@ class Present:
 class Change:
     """Evidence of a change in a series, and where it began."""
 
-    evidence: np.ndarray
-    """after each value; 0 within the baseline"""
-    limit: float
-    """from which on the evidence is an alarm"""
-    alarm: int | None
-    """index of the value with which the alarm came; None without one"""
+    evidence: np.ndarray  #: after each value; 0 within the baseline
+    limit: float  #: from which on the evidence is an alarm
+    alarm: int | None  #: index of the value with which the alarm came; None without one
     begins: tuple[int, int, int] | None
     """index at which the change most likely began, and the 95 % credible range; None without an alarm"""
-    ramp: int
-    """values within which the change is most likely complete; 1 for a step"""
-    deviation: float
-    """standard deviation of a value of typical variance around the level of the baseline"""
+    ramp: int  #: values within which the change is most likely complete; 1 for a step
+    deviation: float  #: standard deviation of a value of typical variance around the level of the baseline
     detectable: float
     """step over the last values behind the baseline, ten at most, that would have been found with a probability of 90 %; infinite if
     these are too few for any step"""
-    needed: int
-    """values behind the baseline from which on a step would be found"""
-    before: float
-    """level of the baseline at its mean conditions"""
+    needed: int  #: values behind the baseline from which on a step would be found
+    before: float  #: level of the baseline at its mean conditions
     present: tuple[Present, ...]
     """present value at the end, and as it was without the last value; empty without a value behind the baseline"""
 

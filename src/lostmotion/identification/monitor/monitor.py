@@ -48,14 +48,10 @@ class MonitorResult:
     """The life of a drive by its logs."""
 
     task: Identification
-    logs: list[LogEstimate]
-    """in their order"""
-    watched: dict[str, Watched]
-    """by parameter, and ``residual``: how well the model describes the logs"""
-    reference: dict[str, float]
-    """medians of the baseline, from which each log was estimated, SI"""
-    left_out: dict[str, str] = field(default_factory=dict)
-    """by log that cannot be used: why"""
+    logs: list[LogEstimate]  #: in their order
+    watched: dict[str, Watched]  #: by parameter, and ``residual``: how well the model describes the logs
+    reference: dict[str, float]  #: medians of the baseline, from which each log was estimated, SI
+    left_out: dict[str, str] = field(default_factory=dict)  #: by log that cannot be used: why
     noise: dict[str, tuple[float, str]] = field(default_factory=dict)
     """by channel without a stated deviation: the deviation of the baseline's residuals, with its SI unit"""
     inputs: list[str] = field(default_factory=list)

@@ -25,24 +25,15 @@ NONE_AFTER = "there is no log after the baseline"
 class LogEstimate:
     """Parameter values of one log, with their intervals."""
 
-    log: str
-    """name of the log"""
-    at: float
-    """place in the order: its number, or the value of ``monitor.order``"""
-    values: Mapping[str, float]
-    """SI, by parameter"""
-    deviations: Mapping[str, float]
-    """standard deviations of the values by the residuals of this log alone, SI"""
-    intervals: Mapping[str, Interval]
-    """95 % intervals of the values, widened by what structured residuals may hide"""
-    residual: float
-    """root mean square of the residuals, relative to the baseline; NaN of a log that cannot be used"""
-    conditions: tuple[float, ...] = ()
-    """values of ``monitor.conditions``"""
-    told: frozenset[str] = frozenset()
-    """parameters that influence the motion of this log"""
-    why: str = ""
-    """why the log is not used; empty if it is"""
+    log: str  #: name of the log
+    at: float  #: place in the order: its number, or the value of ``monitor.order``
+    values: Mapping[str, float]  #: SI, by parameter
+    deviations: Mapping[str, float]  #: standard deviations of the values by the residuals of this log alone, SI
+    intervals: Mapping[str, Interval]  #: 95 % intervals of the values, widened by what structured residuals may hide
+    residual: float  #: root mean square of the residuals, relative to the baseline; NaN of a log that cannot be used
+    conditions: tuple[float, ...] = ()  #: values of ``monitor.conditions``
+    told: frozenset[str] = frozenset()  #: parameters that influence the motion of this log
+    why: str = ""  #: why the log is not used; empty if it is
 
 
 @dataclass(frozen=True)
@@ -50,26 +41,16 @@ class Watched:
     """The series of one parameter, and what it comes to."""
 
     name: str
-    unit: str
-    """in which values are shown"""
-    logs: tuple[int, ...]
-    """numbers of the logs that determine it"""
-    change: Change | None
-    """None if too few baseline logs determine it"""
-    begins: int | None
-    """number of the log at which the change most likely began"""
-    level: Interval | None
-    """95 % interval of the present value, SI; None without a log after the baseline"""
-    before: float
-    """level of the baseline, SI; NaN if too few baseline logs determine it"""
-    now: float
-    """present value, of logs after the baseline alone, SI; NaN without one"""
-    beyond: bool | None
-    """whether the present value is beyond a limit; None if that is not decided"""
-    decided: bool
-    """whether the logs decide about changes and limits"""
-    text: str
-    """one sentence: change, present value, limits"""
+    unit: str  #: in which values are shown
+    logs: tuple[int, ...]  #: numbers of the logs that determine it
+    change: Change | None  #: None if too few baseline logs determine it
+    begins: int | None  #: number of the log at which the change most likely began
+    level: Interval | None  #: 95 % interval of the present value, SI; None without a log after the baseline
+    before: float  #: level of the baseline, SI; NaN if too few baseline logs determine it
+    now: float  #: present value, of logs after the baseline alone, SI; NaN without one
+    beyond: bool | None  #: whether the present value is beyond a limit; None if that is not decided
+    decided: bool  #: whether the logs decide about changes and limits
+    text: str  #: one sentence: change, present value, limits
 
     @property
     def alarm(self) -> bool:

@@ -69,23 +69,19 @@ class Channel:
     """Samples of one quantity, one for each instant of the log."""
 
     values: np.ndarray
-    unit: str = ""
-    """unit as in the file; empty if the file has none"""
+    unit: str = ""  #: unit as in the file; empty if the file has none
 
 
 @dataclass(frozen=True)
 class Log:
     """The record of one measurement: channels, header and notes."""
 
-    name: str
-    """name of its file"""
-    time: np.ndarray
-    """[s]"""
+    name: str  #: name of its file
+    time: np.ndarray  #: [s]
     channels: Mapping[str, Channel]
     header: Mapping[str, Any] = field(default_factory=dict)
     """numbers and words that hold for the whole log, such as the mass that was moved"""
-    notes: tuple[str, ...] = ()
-    """dropped samples and doubtful items, one line each"""
+    notes: tuple[str, ...] = ()  #: dropped samples and doubtful items, one line each
 
     def values(self, name: str) -> np.ndarray:
         """Values of a channel as in the file.

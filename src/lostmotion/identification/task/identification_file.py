@@ -134,8 +134,7 @@ class Identification(Part):
     """Content of an identification file."""
 
     title: str = ""
-    scenario: str
-    """file or name of the rig, which the values below change"""
+    scenario: str  #: file or name of the rig, which the values below change
     logs: LogFiles
     inputs: Elements[InputChannel] = Field(default_factory=nothing)
     """by the result variable of what acts: ``servo_command``, ``arm_load_torque``, ``servo_reference``"""
@@ -146,13 +145,10 @@ class Identification(Part):
     parameters: Elements[FreeParameter] = Field(min_length=1)
     nuisance: Elements[FreeParameter] = Field(default_factory=nothing)
     """one value for each log, with a tolerance: initial state, offset, delay"""
-    ladder: tuple[Rung, ...] = ()
-    """candidate models, from few to many parameters; left out, one with all parameters"""
+    ladder: tuple[Rung, ...] = ()  #: candidate models, from few to many parameters; left out, one with all parameters
     fit: FitOptions = FitOptions()
-    record: str = ""
-    """``gear.NAME`` of the rig, for which a data sheet is written"""
-    monitor: Monitoring = Monitoring()
-    """values that `lostmotion monitor` compares over the life of a drive"""
+    record: str = ""  #: ``gear.NAME`` of the rig, for which a data sheet is written
+    monitor: Monitoring = Monitoring()  #: values that `lostmotion monitor` compares over the life of a drive
 
     @model_validator(mode="before")
     @classmethod

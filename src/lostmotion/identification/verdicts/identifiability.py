@@ -28,13 +28,10 @@ UNSEEN = 1.96  # the same in deviations of the noise
 class Undetermined:
     """A direction in the space of parameters that the logs hardly determine."""
 
-    changes: dict[str, float]
-    """relative changes of the parameters along it, the largest 1"""
-    width: float
-    """relative change of the largest of them within a 95 % interval; infinite if nothing holds it"""
+    changes: dict[str, float]  #: relative changes of the parameters along it, the largest 1
+    width: float  #: relative change of the largest of them within a 95 % interval; infinite if nothing holds it
     text: str
-    directions: int = 1
-    """number of directions that the text describes"""
+    directions: int = 1  #: number of directions that the text describes
 
 
 def undetermined(problem: FitProblem, fit: Fit) -> list[Undetermined]:

@@ -46,16 +46,11 @@ class SharedFault:
     share is the model's, so that they stay in the fit
     """
 
-    logs: tuple[str, ...]
-    """names"""
-    total: int
-    """number of all logs"""
-    fault: str
-    """the fault, with the range of its size"""
-    common: str
-    """property that tells these logs from the others; empty if nothing does"""
-    candidate: str
-    """limit or filter of an input that explains them; empty if none does"""
+    logs: tuple[str, ...]  #: names
+    total: int  #: number of all logs
+    fault: str  #: the fault, with the range of its size
+    common: str  #: property that tells these logs from the others; empty if nothing does
+    candidate: str  #: limit or filter of an input that explains them; empty if none does
 
     @property
     def text(self) -> str:
@@ -78,10 +73,8 @@ class KindError:
     key: str
     value: str
     logs: int
-    mae: float
-    """mean absolute error of the first measured channel, SI"""
-    odd: int
-    """logs among them that disagree with the others"""
+    mae: float  #: mean absolute error of the first measured channel, SI
+    odd: int  #: logs among them that disagree with the others
 
 
 def family(fault: str) -> str:

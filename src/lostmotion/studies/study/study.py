@@ -54,8 +54,7 @@ class Study(Part):
     """Many runs of one scenario, of a drive or of a drive train."""
 
     title: str = ""
-    scenario: Scenario
-    """the base, with all values"""
+    scenario: Scenario  #: the base, with all values
     written: dict[str, Any] = Field(default={})
     """the base as its file has it, with the names of records; empty if made in Python"""
     design: Literal["grid", "list", "latin_hypercube", "sobol", "random", "saltelli"] = "grid"
@@ -67,12 +66,10 @@ class Study(Part):
     keep: dict[str, str] = Field(default={})
     """column = expression of the result variables, such as peak(load_speed) or energy.gear_losses"""
     trajectories: Trajectories | None = None
-    select: Selection | None = None
-    """criteria of the runs that fit the task, and of the best of these"""
+    select: Selection | None = None  #: criteria of the runs that fit the task, and of the best of these
     axis: AxisTask | None = None
     """each run is a cycle of this task, under gains by rule; it keeps the columns of `axis_columns.COLUMNS`"""
-    task_tables: dict[str, Any] = Field(default={})
-    """tables of the task, where keys of its own vary"""
+    task_tables: dict[str, Any] = Field(default={})  #: tables of the task, where keys of its own vary
 
     of_tables: ClassVar[Callable[[dict[str, Any]], "Study"]]
     """makes the study of the tables of a task; set by `task_file`, which knows them"""
