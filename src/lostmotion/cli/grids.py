@@ -16,8 +16,6 @@ def parse_grid(text: str, option: str, unit: str = "") -> list[float]:
     """Values from ``0.1,1,10`` or, with equal ratios, ``0.1..100:60`` (first, last, how many).
 
     unit: of bare numbers (SI); an entry may bring its own.
-
-    Raises InputError: the text is neither, is ambiguous, or is not positive.
     """
     problem = f"--{option} {text}: must be numbers such as 0.1,1,10 or a range such as 0.1..100:60"
     if ".." not in text:

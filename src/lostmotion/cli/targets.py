@@ -61,10 +61,7 @@ def writing(directory: Path, then: str = "") -> Iterator[None]:
 
 
 def pictures_of(figures: str | None, output: Path | None) -> tuple[str, ...]:
-    """Endings of the pictures that are asked for beside a report, whose directory is tried.
-
-    Raises InputError: the directory cannot be written to, there is none, or an ending is unknown.
-    """
+    """Endings of the pictures that are asked for beside a report, whose directory is tried."""
     from ..reports.pictures import endings
 
     pictures = endings(figures)

@@ -44,8 +44,6 @@ def gearbox_table(
 
     A change replaces the value that it names and nothing else. The hysteresis stays as the record prints it, also if
     the stiffness is changed or wear adds backlash.
-
-    Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
     from .gearbox_sheet import GearboxSheet  # here, as most scenarios name no record
     from .records import find
@@ -62,10 +60,7 @@ def gearbox_table(
 
 
 def gearbox_of(sheet: GearboxSheet) -> Gearbox:
-    """The gearbox of a data sheet.
-
-    Raises InputError: it lacks what a run needs.
-    """
+    """The gearbox of a data sheet."""
     return Gearbox(**_table_of_sheet(sheet, shown(sheet.name), {}, "gearbox")[0])
 
 
@@ -315,10 +310,7 @@ OF_STEPPERS = ("steps_per_revolution", "holding_torque", "detent_torque")
 
 
 def motor_table(reference: str, changes: Mapping[str, Any], where: str = "motor") -> dict[str, Any]:
-    """Values of `[motor]`, or of the table `where`, for a record with `changes`. Each change replaces the value that it names.
-
-    Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
-    """
+    """Values of `[motor]`, or of the table `where`, for a record with `changes`. Each change replaces the value that it names."""
     from .motor_sheet import MotorSheet
     from .records import find
 
@@ -363,8 +355,6 @@ def at_voltage(table: Mapping[str, Any], voltage: Any, given: Collection[str], w
     table: as a scenario has it. One that is no whole DC motor with a rated voltage only gets the new one.
     voltage: [V], or text with a unit.
     given: keys that are changed too: where these say all that would follow, nothing does.
-
-    Raises InputError: at this voltage the motor does not reach its rated torque.
     """
     changed = {**table, "rated_voltage": voltage}
     if {"rated_speed", "armature_voltage_constant"} <= set(given):
@@ -393,10 +383,7 @@ ACCESSORIES = {
 
 
 def built_in_brake(motor: str) -> dict[str, Any]:
-    """Values of `task.brake` for the brake of a record of a motor.
-
-    Raises InputError: the catalogue has none.
-    """
+    """Values of `task.brake` for the brake of a record of a motor."""
     from .accessory_sheets import BrakeSheet
     from .records import catalogue
 
@@ -420,10 +407,7 @@ def _accessory(kind: str, table: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def use_accessories(task: Any, motor: Any = None) -> Any:
-    """A table `[task]` with the values of the records of brake and amplifier; the brake of the motor that `motor` names, if it does.
-
-    Raises InputError: a record is unknown, or lacks its main datum.
-    """
+    """A table `[task]` with the values of the records of brake and amplifier; the brake of the motor that `motor` names, if it does."""
     if not isinstance(task, dict):
         return task
     found = dict(task)

@@ -27,8 +27,6 @@ def linear_table(kind: str, reference: str, changes: Mapping[str, Any], where: s
     """Values of the table `where` for a record with `changes`. Each change replaces the keys that give the same quantity.
 
     kind: ``"screw"``, ``"rack"``, ``"belt"`` or ``"linear_motor"``.
-
-    Raises InputError: the record lacks what a run needs and `changes` do not give it; the message says where to read it.
     """
     from .linear_sheets import LinearSheet, ScrewSheet
     from .records import find

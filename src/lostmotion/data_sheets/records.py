@@ -103,10 +103,7 @@ def _named(name: str) -> Sheet | None:
 
 
 def read_sheets(path: Path) -> list[Sheet]:
-    """The records of a sheet file.
-
-    Raises InputError: with one line that names the file, the record, the key, the value and the remedy.
-    """
+    """The records of a sheet file."""
     return parse_sheets(read_toml(path, "a data sheet"), str(path))
 
 
@@ -149,10 +146,7 @@ def _tables(data: Mapping[str, Any], key: str, where: str) -> list[Mapping[str, 
 
 
 def read_again(path: Path) -> tuple[Sheet, ...]:
-    """The records of a sheet file, read only once as long as it does not change.
-
-    Raises InputError: as `read_sheets`.
-    """
+    """The records of a sheet file, read only once as long as it does not change."""
     try:
         status = path.stat()
     except (OSError, ValueError):  # which reading says in one line
@@ -166,10 +160,7 @@ def _kept_sheets(path: Path, _modified: int, _size: int) -> tuple[Sheet, ...]:
 
 
 def _in_file(reference: str, table: str) -> Sheet:
-    """The record that a reference to a file means.
-
-    Raises InputError: the file has none, or several and no name chooses one.
-    """
+    """The record that a reference to a file means."""
     file, _, name = reference.partition("#")
     own = [r for r in read_again(Path(file)) if isinstance(r, KINDS[table])]
     if name:
@@ -189,8 +180,6 @@ def find(reference: str, table: str) -> Sheet:
     """The record of a name, or one of that kind in a file: the only one (``sheets.toml``), or the record of a name (``sheets.toml#name``).
 
     table: a key of `KINDS`, such as ``"gearbox"``.
-
-    Raises InputError: there is none.
     """
     kind = KINDS[table]
     if not isinstance(reference, str):

@@ -30,10 +30,7 @@ CONDITIONS: dict[str, type[Part]] = {"gears": Conditions, "screws": ScrewConditi
 
 
 def use_train_records(data: dict[str, Any], written: Callable[[str], str] = str) -> None:
-    """Puts the values of a record in place of the key that names it, such as `gears.NAME.gearbox` and `screws.NAME.from`.
-
-    Raises InputError: a record is unknown or lacks what a run needs.
-    """
+    """Puts the values of a record in place of the key that names it, such as `gears.NAME.gearbox` and `screws.NAME.from`."""
     if "task" in data:
         data["task"] = use_accessories(data["task"])
     for table in RECORDS:

@@ -87,8 +87,6 @@ def climb(
     """Fit all candidate models, one after the other.
 
     models: the models that an interrupted identification has fitted: the search goes on from their values.
-
-    Raises InputError: no log is left to fit, or the rig has no motion at the start.
     """
     task = rig.task
     train = [log for log in logs if not log.held_out]

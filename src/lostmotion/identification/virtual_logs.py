@@ -36,8 +36,6 @@ def virtual_log(
     rung: index of the candidate model; -1: the last.
     noise: standard deviations of the measured channels by name, SI.
     seed: of the noise.
-
-    Raises InputError: the values make no rig.
     """
     task = rig.task
     known = {name: p.start for name, p in {**task.parameters, **task.nuisance}.items()} | dict(values)

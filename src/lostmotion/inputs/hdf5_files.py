@@ -20,8 +20,6 @@ def datasets(path: Path, file: Any, limit: int = LOG, depth: int = 0) -> dict[st
     file: ``h5py.File``.
     limit: default of the memory limit [bytes].
     depth: levels of groups below the root whose datasets are wanted.
-
-    Raises InputError: the file announces or contains more data than the limit, or refers to other files.
     """
     found: dict[str, Any] = {}
     _collect(path, file, "", found, depth, set())

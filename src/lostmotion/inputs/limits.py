@@ -35,10 +35,7 @@ def shown_size(size: float) -> str:
 
 
 def memory_limit(default: int = LOG) -> int:
-    """Bytes that one input file may need: ``LOSTMOTION_MEMORY``, else the default.
-
-    Raises InputError: the variable is no size.
-    """
+    """Bytes that one input file may need: ``LOSTMOTION_MEMORY``, else the default."""
     text = os.environ.get(VARIABLE, "")
     try:
         return size_of(text) if text else default
@@ -67,8 +64,6 @@ def check_free(needed: float, what: str, remedy: str) -> None:
     needed: bytes.
     what: the results in the plural, as the beginning of the message.
     remedy: its end.
-
-    Raises InputError: it states the memory that they need and the free memory.
     """
     free = None if needed < ALWAYS_FREE else free_memory()
     if free is not None and needed > free:
@@ -95,9 +90,6 @@ def read_text(path: Path, *, per_byte: float = PER_BYTE, default: int = LOG) -> 
     path: may be a pipe.
     per_byte: memory that each byte of the text will need in the end.
     default: limit where the user gives none [bytes].
-
-    Raises InputError: the file is too long.
-    Raises OSError, UnicodeDecodeError
     """
     room = int(memory_limit(default) / per_byte)
     with path.open("rb") as file:

@@ -34,8 +34,6 @@ def syntax_tree(text: str, kind: str, remedy: str = "") -> ast.expr:
 
     kind: what it is in messages, such as ``"a formula"``.
     remedy: clause on what to do with one that is too long or nested too deeply.
-
-    Raises ValueError: it cannot be read, or is too long or nested too deeply.
     """
     remedy = f"; {remedy}" if remedy else ""
     if len(text) > MAX_LENGTH:

@@ -81,10 +81,7 @@ Whole = Annotated[int, BeforeValidator(_no_boolean)]  # a whole number
 
 
 def argument(name: str, value: Any, unit: str) -> float:
-    """A number that is given to a function, in `unit` (SI); as a string with its own unit too.
-
-    Raises InputError: it is no finite number, or has the unit of something else.
-    """
+    """A number that is given to a function, in `unit` (SI); as a string with its own unit too."""
     try:
         number = Unit(unit).read(value)
     except ValueError as error:

@@ -48,10 +48,7 @@ def in_short(path: Path) -> str:
 
 
 def read_toml(path: Path, what: str) -> dict[str, Any]:
-    """The contents of a TOML file that is meant to hold `what`.
-
-    Raises InputError: it cannot be read; the message says why, and what may have been meant.
-    """
+    """The contents of a TOML file that is meant to hold `what`."""
     if path.suffix in RESULTS and os.path.isfile(path):
         raise InputError(f"{path}: has the ending of a saved result; {what} is a TOML file (.toml)")
     try:

@@ -14,10 +14,7 @@ MOST = 10_000  # members
 
 
 def members(path: Path, archive: zipfile.ZipFile, limit: int = LOG) -> dict[str, zipfile.ZipInfo]:
-    """Members of an open archive by name, if all of them fit into memory; each is read up to the size that it announces.
-
-    Raises InputError: the archive announces more data than the limit, or holds what is not read.
-    """
+    """Members of an open archive by name, if all of them fit into memory; each is read up to the size that it announces."""
     found = archive.infolist()
     if len(found) > MOST:
         raise InputError(

@@ -29,8 +29,6 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
     """The scenario as page/src/description.ts describes it.
 
     name: by which downloads are called.
-
-    Raises InputError: a controller has a law of your own, which only Python can call.
     """
     need_free_motion(scenario, "live page")
     numbers, values = described(scenario)

@@ -29,9 +29,6 @@ def page(scenario: Scenario, name: str = "drive") -> str:
     """The page as HTML; nothing in it refers to anything outside.
 
     name: by which downloads are called.
-
-    Raises InputError: a controller has a law of your own, which only Python can call; in a checkout, the page has not
-        been built.
     """
     core = core_of(scenario)
     if shutil.which("npm") is not None:

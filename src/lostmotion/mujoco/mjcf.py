@@ -169,10 +169,7 @@ def from_mjcf(
 
 
 def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
-    """The law of an actuator on a joint.
-
-    Raises InputError: it has another one, or an attribute that is not taken over.
-    """
+    """The law of an actuator on a joint."""
     import mujoco
 
     def refuse(attribute: str, value: Any) -> InputError:

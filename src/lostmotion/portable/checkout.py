@@ -21,8 +21,6 @@ def made_here(target: str, made: Iterable[Path], what: str) -> None:
     target: of the Makefile.
     made: the files, as far as they exist.
     what: what they are, for the line that announces it.
-
-    Raises InputError: the compilation failed.
     """
     if not (CHECKOUT / "Makefile").is_file() or not (CHECKOUT / "core" / "kernels").is_dir():
         return

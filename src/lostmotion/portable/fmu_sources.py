@@ -43,8 +43,6 @@ def source_files(
     kernel: kernel that the scenario needs.
     identifier: model identifier, the prefix of all functions.
     description, names: the resources scenario.bin and names.txt.
-
-    Raises InputError: this installation has no sources.
     """
     listed = directory / "names.txt"
     if not listed.is_file():

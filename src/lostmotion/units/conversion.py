@@ -37,11 +37,7 @@ _OPERATION = re.compile(r"\s*(\*\*|[*/+^-])\s*([0-9.]+)(?:\s*(?:\^|\*\*)\s*([+-]
 
 @lru_cache(maxsize=10_000)  # data sheets say the same again and again
 def to_si(text: str, unit: str) -> float:
-    """Value of `text`, such as ``"3300 rpm"``, in `unit` (SI; ``""`` for a plain number).
-
-    Raises ValueError: the text is not one number with one unit, or its unit measures something else. The message shows
-        what would be right.
-    """
+    """Value of `text`, such as ``"3300 rpm"``, in `unit` (SI; ``""`` for a plain number)."""
     if len(text) > MAX_LENGTH:
         raise ValueError(f"is too long for one number with one unit; write {_wanted(unit)}")
     digits, symbol = _split(plain(text), unit)
@@ -68,20 +64,14 @@ def to_si(text: str, unit: str) -> float:
 
 
 def si_value(text: str, unit: str) -> float:
-    """Value as `to_si` returns it, for a text that cannot but be a string: a bare number is in `unit`.
-
-    Raises ValueError
-    """
+    """Value as `to_si` returns it, for a text that cannot but be a string: a bare number is in `unit`."""
     number = plain(text)
     return float(number) if _NUMBER.fullmatch(number) and math.isfinite(float(number)) else to_si(text, unit)
 
 
 @lru_cache(maxsize=1000)
 def si_factor(unit: str) -> float:
-    """One of a unit in SI, angles in rad: ``"deg"`` is 0.01745, ``"rpm"`` 0.1047; 1 without a unit.
-
-    Raises ValueError: the unit is not known.
-    """
+    """One of a unit in SI, angles in rad: ``"deg"`` is 0.01745, ``"rpm"`` 0.1047; 1 without a unit."""
     if unit.strip() in ("", "-", "1"):
         return 1.0
     try:

@@ -175,8 +175,6 @@ def read_unit(text: str) -> Product:
     """The powers of the units in a product such as ``N*m/arcmin``, ``kg cm^2``, ``min-1`` or ``V/(rad/s)``.
 
     A slash divides by the next factor alone, as in every programming language. The text is `plain`.
-
-    Raises UnknownUnitError
     """
     text = re.sub(r"^(1\s*)?/", "1/", text)
     found: Product = {}

@@ -206,8 +206,6 @@ def search(
     """Levenberg-Marquardt from a point.
 
     notify: is told the iteration and the cost.
-
-    Raises InputError: the rig has no motion at the start, or no log can be run.
     """
     both = {**problem.parameters, **problem.nuisance}
     residuals = problem.engine.residuals(problem.logs, start, problem.rung, both)

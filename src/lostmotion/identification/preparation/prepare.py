@@ -38,8 +38,6 @@ def prepared(
 
     units: SI units of inputs and measured variables of the rig by name.
     origin: what formulas may name of its file, ``file`` and ``folder``, unless its header has the same key.
-
-    Raises InputError: it lacks a channel, or no part of it can be used.
     """
     measured = {name: m.channel for name, m in task.measured.items()}
     inputs = {name: i.channel for name, i in task.inputs.items()}

@@ -39,8 +39,6 @@ def screened(log: Log, measured: Iterable[str], inputs: Iterable[str], stated: d
     measured: channels that are compared: glitches in them become NaN as missing values are, and all others keep the sample.
     inputs: channels that act on the rig, or that switch it: samples in which one is missing are dropped.
     stated: keys of the header, and the channels that ought to agree with them.
-
-    Raises InputError: nothing is left that could be used; the message says why.
     """
     measured, inputs = list(measured), list(inputs)
     for name in (*measured, *inputs):

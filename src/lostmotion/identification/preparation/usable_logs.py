@@ -22,11 +22,7 @@ MANY = 12  # values of what a condition names, up to which they are listed
 
 
 def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]:
-    """(the usable logs of a task, screened; reasons by name why the others cannot be used).
-
-    Raises InputError: a name stands for no file, or half of the logs or more cannot be used: then it is rather the task
-        that is wrong.
-    """
+    """(the usable logs of a task, screened; reasons by name why the others cannot be used)."""
     task = rig.task
     paths = find_logs(task.logs.files, directory)
     names = dict(zip(paths, distinct_names(paths), strict=True))

@@ -36,8 +36,6 @@ def conversion_of(text: str) -> Callable[[np.ndarray], np.ndarray]:
         base e) and ``pi``.
 
     Returns callable: takes an array of raw values of any type of numbers, and computes in double precision.
-
-    Raises ValueError: the formula has something else in it.
     """
     formula = Formula(text, FUNCTIONS)
     if other := sorted(formula.names.difference(NAMES)):

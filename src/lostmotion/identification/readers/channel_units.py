@@ -20,8 +20,6 @@ def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[flo
 
     written: as the identification file says; if empty, `of_file` holds, and if that is empty, the channel is in SI.
     unit: SI unit of what it is compared with; units of another kind are read as what they are, for a `scale` to turn them.
-
-    Raises InputError: the unit is not known.
     """
     text = (written or of_file).strip()
     if text in ("", "-", "1", "bool"):

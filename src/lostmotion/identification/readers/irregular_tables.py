@@ -36,8 +36,6 @@ def odd_table_log(
     """(number of lines and cells that are lost, the log).
 
     rows, number, comments, time: as in `table_log`.
-
-    Raises UnreadError: there is no table, or too many rows would be lost.
     """
     begin = next((k for k in range(min(HEADER, len(rows))) if _begins(rows[k : k + IN_ROW], number)), None)
     if begin is None:

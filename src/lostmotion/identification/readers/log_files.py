@@ -97,10 +97,7 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
 
 
 def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
-    """Files by names or patterns (``*``, ``**``) relative to a directory; a directory stands for all logs in it.
-
-    Raises InputError: one of them names no file.
-    """
+    """Files by names or patterns (``*``, ``**``) relative to a directory; a directory stands for all logs in it."""
     found: list[Path] = []
     for pattern in patterns:
         path = directory / pattern

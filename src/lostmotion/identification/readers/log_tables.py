@@ -49,10 +49,7 @@ class Stamps:
         self.zoned = False
 
     def seconds(self, cell: Any) -> float | None:
-        """Time of a stamp [s]; None where the cell is no stamp.
-
-        Raises ValueError: some stamps have a zone, and others have none.
-        """
+        """Time of a stamp [s]; None where the cell is no stamp."""
         found = _nanoseconds(cell)
         if found is None:
             return None
@@ -96,8 +93,6 @@ def table_log(
     comments: those read so far; ``key: value``, ``key = value`` and ``unit COLUMN: deg`` are the header. More may be
         added with the rows.
     time: name of the column of the time; left out, ``time``, ``t``, ``timestamp``, or the first column.
-
-    Raises UnreadError: a row does not fit.
     """
     first, cells = next(rows, (1, ()))
     above = comments[-1] if comments else ""

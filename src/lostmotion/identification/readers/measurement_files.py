@@ -303,8 +303,6 @@ def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[st
 
     The columns of a matrix ``x`` are ``x column 1``, ``x column 2`` and so on. If the file holds nothing but one matrix, its first column
     is the time.
-
-    Raises InputError: there is no time.
     """
     arrays = {n: np.asarray(v) for n, v in variables.items() if np.ndim(v) > 0 and np.asarray(v).dtype.kind in "biuf"}
     vectors = {n: v for n, v in arrays.items() if v.ndim == 1}

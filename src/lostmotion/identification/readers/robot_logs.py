@@ -56,8 +56,6 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
 
     time: the topic of the times; default: the topic of the first message. ``TOPIC.header.stamp`` takes the stamps in
         its messages in place of their publish times.
-
-    Raises MissingLibraryError: mcap, or for messages of ROS rosbags, is not installed.
     """
     need("mcap", "Reading MCAP files", "identify")
     recording = _read_mcap(path)
@@ -73,8 +71,6 @@ def read_ros_bag(path: Path, *, time: str = "") -> Log:
     """Read a bag of ROS 1 (``.bag``) or ROS 2 (``.db3``): channels as of MCAP files, at the times of recording.
 
     Messages of ROS 2 bags without definitions are read by the definitions of Humble.
-
-    Raises MissingLibraryError: rosbags is not installed.
     """
     need("rosbags", "Reading bags of ROS", "identify")
     recording = _read_bag(path)
@@ -209,8 +205,6 @@ def _types(text: str, name: str, *, idl: bool) -> dict[str, Any]:
     that it would process without limit are refused here. They are fixed lists of words or messages: the library
     writes lines of code for each entry. They are also lists of messages without any byte, and shifts to numbers of any
     length.
-
-    Raises ValueError: the definition is too large; the library raises errors of its own where it cannot be read.
     """
     from rosbags.typesys import get_types_from_idl, get_types_from_msg
 

@@ -72,10 +72,7 @@ def stretches(rig: Rig, log: Prepared, known: Mapping[str, Any], shown: ShownMot
 
 
 def missing_torque(rig: Rig, s: Stretch, known: Mapping[str, Any], rung: int, shown: ShownMotion) -> np.ndarray:
-    """r of each block [N·m].
-
-    Raises InputError: the rig is not one that moves as one shaft, or a torque is not known: why.
-    """
+    """r of each block [N·m]."""
     scenario = rig.built(rig.changes(known, rung, s.phase)).scenario
     _check(scenario)
     train = scenario.train()

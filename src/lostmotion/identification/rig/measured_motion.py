@@ -33,10 +33,7 @@ class ShownMotion:
 
 
 def shown_motion(rig: Rig) -> ShownMotion:
-    """The first measured channel that shows an angle, or if none does and no torque depends on the angle, a speed.
-
-    Raises InputError: none does.
-    """
+    """The first measured channel that shows an angle, or if none does and no torque depends on the angle, a speed."""
     refuse_given_motion(rig.scenario)
     train = rig.scenario.train()
     plain = {name: m.variable for name, m in rig.task.measured.items() if m.filter_time == 0.0}
@@ -81,8 +78,6 @@ def windows(rig: Rig, logs: Sequence[Prepared], point: ParameterPoint, rung: int
     """Logs in windows. Each run begins at the angle and the speed that were measured there, or at the speed alone.
 
     length: of a window [s].
-
-    Raises InputError: no channel shows the state of the rig, or a window has too few samples.
     """
     try:
         shown = shown_motion(rig)

@@ -21,10 +21,7 @@ def speed_of(name: str) -> str:
 
 
 def given_speed(task: Identification, log: Prepared, name: str) -> np.ndarray:
-    """Speed of the shaft at the samples of a log, SI: smoothed, and the derivative if the channel is an angle or a position.
-
-    Raises InputError: an angle without `smoothing`, or too few samples in a local cubic.
-    """
+    """Speed of the shaft at the samples of a log, SI: smoothed, and the derivative if the channel is an angle or a position."""
     key = ("speed", name)
     if key not in log.cache:
         log.cache[key] = _speed(task, log, name)

@@ -67,8 +67,6 @@ def run_logs(
 
     parameters: by which there are derivatives.
     extra: further variables of the rig that are shown.
-
-    Raises NoDerivativeError: one of the parameters has no exact derivative.
     """
     by = dict(parameters or {})
     courses = [_Course(rig, log, values, rung, by, extra) for log, values in requests]
@@ -91,11 +89,7 @@ def run_logs(
 
 
 def run_log(rig: Rig, log: Prepared, values: Values, rung: int, extra: tuple[str, ...] = ()) -> dict[str, np.ndarray]:
-    """Computed values of the measured channels of a log, by name, and more variables of the rig, at its instants.
-
-    Raises InputError: the values make no rig.
-    Raises SolverError: the motion has no continuation.
-    """
+    """Computed values of the measured channels of a log, by name, and more variables of the rig, at its instants."""
     (seen,) = run_logs(rig, [(log, values)], rung, extra=extra)
     if seen.error is not None:
         raise seen.error

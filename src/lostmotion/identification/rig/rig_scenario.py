@@ -79,8 +79,6 @@ class Rig:
 
     task: the identification.
     directory: that file names are relative to.
-
-    Raises InputError: the scenario cannot be used, or it has no such input or variable.
     """
 
     def __init__(self, task: Identification, directory: Path) -> None:
@@ -190,8 +188,6 @@ class Rig:
         """Values of the scenario by dotted key.
 
         keys: these alone; left out, all.
-
-        Raises InputError: a formula has no value.
         """
         formulas = self.formulas(rung, phase)
         return {key: _value(formulas[key], values, key) for key in (formulas if keys is None else keys)}

@@ -36,8 +36,6 @@ class Formula:
 
     text: as written; a number is a constant.
     functions: functions that it may call; a NumPy ufunc takes its number of arguments.
-
-    Raises ValueError: it cannot be read, or has something else in it.
     """
 
     def __init__(self, text: str | float, functions: Functions = FUNCTIONS) -> None:

@@ -52,8 +52,6 @@ class Expression:
 
     text: as written.
     vocabulary: what it may name.
-
-    Raises ValueError: it cannot be read, uses what the grammar does not have, or leaves a value for each instant.
     """
 
     def __init__(self, text: str, vocabulary: Vocabulary) -> None:

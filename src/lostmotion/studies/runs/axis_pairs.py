@@ -107,10 +107,7 @@ class Axes:
         return None if kind is None or self.study.slides_itself(row) else self.study.part_key(kind, row)
 
     def stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]] | None:
-        """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load.
-
-        Raises InputError: its record lacks data.
-        """
+        """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load."""
         if self.task.linear is None or self.study.slides_itself(row):
             return None
         found = self._once(("stage motion", self._stage_key(row)), lambda: self._stage(row))

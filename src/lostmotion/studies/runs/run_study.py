@@ -131,10 +131,7 @@ def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
 
 
 def damages_of(directory: Path, what: Study) -> dict[Path, str]:
-    """Damaged parts of the directory of a study, each with the reason.
-
-    Raises InputError: the note is what is wrong: it is of another study than all parts, which repairing would remove.
-    """
+    """Damaged parts of the directory of a study, each with the reason."""
     text = to_json(what)
     damaged = damages(directory, what, text)
     foreign = [path for path, reason in damaged.items() if reason == FOREIGN]
@@ -267,10 +264,7 @@ def study_of(directory: str | Path) -> Study:
 
 
 def restore_note(directory: Path) -> None:
-    """Write the study that a part carries into the directory, if its own note is missing, damaged or of another study.
-
-    Raises InputError: no part can be read.
-    """
+    """Write the study that a part carries into the directory, if its own note is missing, damaged or of another study."""
     need("pyarrow", "A study", "study")
     try:
         damages_of(directory, study_of(directory))

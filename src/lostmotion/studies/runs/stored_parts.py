@@ -30,10 +30,7 @@ def parts(directory: Path, what: Study) -> dict[tuple[int, int], Path]:
 
 
 def write_part(part: Path, content: bytes) -> None:
-    """Write a part whole or not at all. Its checksum comes first: a part without one would be made again.
-
-    Raises InputError: the part cannot be written.
-    """
+    """Write a part whole or not at all. Its checksum comes first: a part without one would be made again."""
     try:
         with part.with_name(CHECKSUMS).open("a", encoding="ascii") as file:
             file.write(f"{hashlib.sha256(content).hexdigest()}  {part.name}\n")
@@ -43,10 +40,7 @@ def write_part(part: Path, content: bytes) -> None:
 
 
 def checksums(directory: Path) -> dict[str, str]:
-    """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over.
-
-    Raises InputError: there is something else in place of their file.
-    """
+    """Checksums of parts by their names; lines that a kill or damage left unreadable are passed over."""
     path = directory / CHECKSUMS
     if not os.path.lexists(path):
         return {}

@@ -74,8 +74,6 @@ def slowed(study: Study, factor: float) -> Study:
     """The task with a cycle that takes so many times as long: moves, rests, payloads and process alike.
 
     Its loads over time are stretched; torques of a process and of the load keep their values.
-
-    Raises InputError: the motion has parts that cannot be stretched, such as a target in space.
     """
     task, base = study.axis, study.scenario
     assert task is not None

@@ -74,8 +74,6 @@ class Price:
 def candidates(table: pa.Table, study: Study) -> list[RankedCandidate]:
     """Rank the runs of a study that selects. Runs that fit come first, then runs that violate one limit, two, ...,
     each from the best to the worst. Runs that failed come last.
-
-    Raises ValueError: the study has no table `[select]`.
     """
     select = study.select
     if select is None:

@@ -198,10 +198,7 @@ def _with_parts(written: dict[str, Any], vary: list[Any], *, linear: bool) -> No
 
 
 def _with_candidates(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables with `[candidates]` written as `[[vary]]`.
-
-    Raises InputError: a key is none of a part, or varies twice.
-    """
+    """The tables with `[candidates]` written as `[[vary]]`."""
     if "candidates" not in tables:
         return tables
     given, vary = tables["candidates"], tables.get("vary", [])
@@ -268,10 +265,7 @@ def _names(entry: dict[str, Any]) -> list[str]:
 
 
 def linear_axis(tables: dict[str, Any]) -> dict[str, Any] | None:
-    """Last stage and slope of a linear task, or None for a rotary one.
-
-    Raises InputError: a table is missing, or does not fit the others.
-    """
+    """Last stage and slope of a linear task, or None for a rotary one."""
     given, direct = ([kind for kind in kinds if kind in tables or _varied(tables, kind)] for kinds in (STAGES, LINEAR))
     if "slide" not in tables and not given and not direct:
         return None
@@ -310,8 +304,6 @@ def in_translation(tables: dict[str, Any]) -> dict[str, Any]:
     """The tables of a linear task as the tables of a rotary one with the same numbers: kg for kg m², m for rad, N for N m.
 
     The equations of a slide behind a screw equal the equations of a load behind a gear of the ratio 2 pi/lead.
-
-    Raises InputError: a value has the unit of something else.
     """
     slide = tables["slide"]
     for key in slide:
@@ -391,10 +383,7 @@ def _controller(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def _apart(controller: dict[str, Any]) -> tuple[AnyCurrent | None, dict[str, Any]]:
-    """The current loop of a controller, and the controller with an ideal one, which every motor of the task can have.
-
-    Raises InputError: the loop has a value that cannot be used.
-    """
+    """The current loop of a controller, and the controller with an ideal one, which every motor of the task can have."""
     if not isinstance(controller["current"], dict):
         return None, controller  # which the scenario refuses
     loop: Any = controller["current"]
@@ -450,10 +439,7 @@ def _has_pairs(tables: dict[str, Any], vary: list[Any]) -> bool:
 
 
 def _need_scale(controller: dict[str, Any], vary: list[Any]) -> None:
-    """Sees that a task with linear motors has the scale by which they are controlled.
-
-    Raises InputError: it has none.
-    """
+    """Sees that a task with linear motors has the scale by which they are controlled."""
     if controller.get("position_encoder") is None and _varied({"vary": vary}, "linear_motor"):
         raise InputError(
             'a linear motor needs a scale; add it, such as { grating_period = "20 um", bits = 10 }',

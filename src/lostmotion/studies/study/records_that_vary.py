@@ -73,8 +73,6 @@ def names_that_fit(table: str, wanted: Mapping[str, Any]) -> list[str]:
     table: the kind of records, such as ``"gearbox"``.
     wanted: for each datum of a record a text in any case with ``*`` for anything (``kind``, ``manufacturer``,
         ``name``), or minimum and maximum. A record that lacks the datum does not fit.
-
-    Raises ValueError: a key is no datum of such records, its value is neither, or nothing fits.
     """
     schema = KINDS[table].model_json_schema()["properties"]
     known = [key for key, node in schema.items() if unit_in_schema(node) is not None or _is_text(key)]
@@ -150,8 +148,6 @@ def names_of(table: str, given: Any, directory: Path = Path()) -> list[str]:
     given: one of these, or a list: the name of a record; a file (``.toml``) or a directory of such files; all records
         of the kind are taken; a filter as `names_that_fit` takes it. What is named twice is taken once.
     directory: files and directories are relative to it.
-
-    Raises ValueError: there is no such file or record, or nothing fits.
     """
     found: list[str] = []
     for one in given if isinstance(given, list | tuple) else [given]:
@@ -195,10 +191,7 @@ def shown_name(reference: str) -> str:
 
 
 def check_names(table: str, names: Any) -> None:
-    """Sees that all are names of records, or of files with one.
-
-    Raises ValueError: one is not; the message says what may have been meant.
-    """
+    """Sees that all are names of records, or of files with one."""
     if not isinstance(names, list | tuple):
         raise ValueError(f"has values = {shown(names)}; it must be a list of names")
     for name in names:
@@ -212,8 +205,6 @@ def with_records(written: Mapping[str, Any], changes: Mapping[str, Any]) -> Scen
 
     What the tables give beside the name of a record holds for every record; of a part without such a name the record takes
     the place.
-
-    Raises InputError: a record lacks what a run needs, or a value cannot be used.
     """
     tables = dict(written)
     # The names first, so that the conditions find them.

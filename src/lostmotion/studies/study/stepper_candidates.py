@@ -23,8 +23,6 @@ def stepper_of(beside: Mapping[str, Any], parameters: list[tuple[Vary, float]]) 
     """The stepper that a row of a task has by some of its parameters; None of another motor.
 
     beside: table `[motor]` of the task.
-
-    Raises InputError: a record lacks data, or a value does not fit.
     """
     table, factors = dict(beside), dict[str, float]()
     for varied, number in parameters:

@@ -61,10 +61,7 @@ def load_study(path: str | Path) -> Study:
 
 
 def find_sheets(entry: Any, directory: Path) -> None:
-    """Files and directories of data sheets among the values are relative to the study file.
-
-    Raises InputError: one of them has no record of that kind.
-    """
+    """Files and directories of data sheets among the values are relative to the study file."""
     if not isinstance(entry, dict) or not isinstance(entry.get("key"), str):
         return
     kind = kind_of_record(entry["key"])

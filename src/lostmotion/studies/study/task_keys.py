@@ -32,10 +32,7 @@ def is_own(key: str) -> bool:
 
 
 def with_first(tables: dict[str, Any]) -> dict[str, Any]:
-    """The tables of a task with the first value of each own key that varies, whose values are in SI then.
-
-    Raises InputError: a value has the unit of something else, or is none.
-    """
+    """The tables of a task with the first value of each own key that varies, whose values are in SI then."""
     entries = tables.get("vary")
     if not isinstance(entries, list):
         return tables

@@ -224,10 +224,7 @@ def with_keys_of_tables(scenario: Scenario, entries: Any, of_task: bool) -> Any:
 
 
 def check_spelling(scenario: Scenario, entries: Any) -> None:
-    """Sees, before the units of their values are asked for, that the keys of a study are known.
-
-    Raises ValueError: one is not; the message says what may have been meant.
-    """
+    """Sees, before the units of their values are asked for, that the keys of a study are known."""
     for entry in entries if isinstance(entries, list | tuple) else ():
         for key in [entry.get("key"), *(entry.get("keys") or ())] if isinstance(entry, dict) else ():
             if (
@@ -241,10 +238,7 @@ def check_spelling(scenario: Scenario, entries: Any) -> None:
 
 
 def check_key(scenario: Scenario, key: str, *, relative: bool) -> None:
-    """Sees that a number, or with `relative` a factor, can take the place of what a scenario has under a key.
-
-    Raises ValueError: it cannot; the message says what to vary instead.
-    """
+    """Sees that a number, or with `relative` a factor, can take the place of what a scenario has under a key."""
     if is_condition(key):
         if relative:
             raise ValueError(f"varies {key} with relative, but it is itself no datum of the record; give its values")
