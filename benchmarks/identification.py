@@ -71,7 +71,7 @@ class ByDifferences(Engine):
         return super().jacobians(logs, point, rung, parameters)
 
 
-def fitted(rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, goal: float) -> tuple[float, float]:
+def fitted(engine: Engine, train: list[Prepared], start: ParameterPoint, goal: float) -> tuple[float, float]:
     """(processor time [s], cost) when a search has arrived."""
     reached: list[float] = []
     begin = time.process_time()
@@ -80,13 +80,13 @@ def fitted(rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoin
         if cost <= goal and not reached:
             reached.append(time.process_time() - begin)
 
-    fit = search(problem(rig, engine, train), start, iterations=40, notify=notice)
+    fit = search(problem(engine, train), start, iterations=40, notify=notice)
     return (reached or [time.process_time() - begin])[0], fit.cost
 
 
-def problem(rig: Rig, engine: Engine, train: list[Prepared]) -> FitProblem:
+def problem(engine: Engine, train: list[Prepared]) -> FitProblem:
     """With the deviation of noise and steps, so that costs of different points can be compared."""
-    return replace(problem_of(rig, engine, train, RUNG), given=np.array([np.hypot(5e-4, 1.534e-3 / np.sqrt(12.0))]))
+    return replace(problem_of(engine, train, RUNG), given=np.array([np.hypot(5e-4, 1.534e-3 / np.sqrt(12.0))]))
 
 
 def by_cma(p: FitProblem, start: ParameterPoint, goal: float) -> tuple[float, float, int]:
@@ -133,12 +133,12 @@ def section(report: Report) -> None:
     ladder, of_ladder = time.perf_counter() - begin, time.process_time() - processor_before
 
     few = logs(rig, 6)
-    truth = problem(rig, Engine(rig, 1), few)
+    truth = problem(Engine(rig, 1), few)
     least = search(truth, ParameterPoint(start.values | TRUTH, {}), iterations=10).cost
     goal = NEAR * least
-    exact, cost = fitted(rig, Engine(rig, 1), few, start, goal)
-    differences, cost_of_differences = fitted(rig, ByDifferences(rig, 1), few, start, goal)
-    evolution, cost_of_evolution, tried = by_cma(problem(rig, Engine(rig, 1), few), start, goal)
+    exact, cost = fitted(Engine(rig, 1), few, start, goal)
+    differences, cost_of_differences = fitted(ByDifferences(rig, 1), few, start, goal)
+    evolution, cost_of_evolution, tried = by_cma(problem(Engine(rig, 1), few), start, goal)
 
     report.section(
         "Identification",

@@ -268,7 +268,7 @@ def test_a_run_that_fails_at_the_start_values_names_its_log(logs: Path) -> None:
     prepared_logs = [prepared(task, log, rig.units) for log in read_all(task, SERVO)]
     point = start_point(task, prepared_logs)
     wrong = replace(point, nuisance={"002.json": {"coulomb_friction": -1.0}})
-    problem = problem_of(rig, Engine(rig, threads=1), prepared_logs, 0)
+    problem = problem_of(Engine(rig, threads=1), prepared_logs, 0)
     refused(lambda: search(problem, wrong, iterations=1), match=r"002\.json: has no run at the start values of .*friction_torque")
 
 
@@ -285,7 +285,7 @@ def test_of_several_starts_the_fit_with_the_smallest_error_is_taken(starts: tupl
         task = Identification(**(data | {"ladder": [rung]}))
         rig = Rig(task, SERVO)
         read = [prepared(task, log, rig.units) for log in read_all(task, SERVO)]
-        (only,) = climb(rig, Engine(rig, threads=1), read, start_point(task, read), lambda *_: None, Progress(None).of(task, read))
+        (only,) = climb(Engine(rig, threads=1), read, start_point(task, read), lambda *_: None, Progress(None).of(task, read))
         return only.fit.mae
 
     alone = [error(value) for value in starts]

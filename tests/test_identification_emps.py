@@ -57,7 +57,7 @@ def test_the_regression_of_inverse_dynamics_is_that_of_the_description() -> None
     train = [log for log in logs if not log.held_out]
     start = start_point(rig.task, train)
     half = {name: (1.0 if name == "offset" else 0.5) * value for name, value in start.values.items()}
-    _, found = regressed(rig, Engine(rig), train, ParameterPoint(half, start.nuisance), free_on(rig.task, 0))
+    _, found = regressed(Engine(rig), train, ParameterPoint(half, start.nuisance), free_on(rig.task, 0))
     assert set(found.found) == {"mass", "viscous_friction", "coulomb_friction", "offset"}
     for name, value in found.found.items():
         assert value == pytest.approx(PUBLISHED[name], rel=0.05)

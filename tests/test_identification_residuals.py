@@ -131,7 +131,7 @@ def problem_with(directory: Path, residuals: np.ndarray) -> list[Any]:
     log = Log("0.csv", 1e-3 * np.arange(n), {"torque": Channel(np.zeros(n)), "angle": Channel(np.arange(n) * 1e-4)})
     logs = [prepared(task, log, rig.units)]
     start_point(task, logs)
-    return misfits(problem_of(rig, Engine(rig, threads=1), logs, 0), [residuals])
+    return misfits(problem_of(Engine(rig, threads=1), logs, 0), [residuals])
 
 
 @pytest.mark.parametrize("rho", [0.0, 0.9])

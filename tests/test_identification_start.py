@@ -122,7 +122,7 @@ def test_parameters_of_which_the_torques_are_no_sum_keep_their_starts(tmp_path: 
     data["parameters"]["coulomb"] |= {"max": 0.151, "start": 0.149, "min": 0.148}
     rig = Rig(Identification(**data), tmp_path)
     logs = axis_logs(rig, VALUES | {"coulomb": 0.3})
-    point, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    point, start = regressed(Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
     assert "prior" in start.kept["inertia"]
     assert "their product with radius" in start.kept["weight"]  # `radius`, of the two the first in the file, is found
     assert "out of its bounds" in start.kept["coulomb"]
@@ -138,7 +138,7 @@ def test_a_weight_is_linear_however_many_straight_lines_its_torque_has(tmp_path:
     data["set"]["gravity.weight.error"] = 0.005
     rig = Rig(Identification(**data), tmp_path)
     logs = axis_logs(rig, VALUES)
-    _, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    _, start = regressed(Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
     assert not start.kept and start.found["weight"] == pytest.approx(VALUES["weight"], rel=0.05)
 
 
@@ -165,7 +165,7 @@ def test_where_the_torques_are_not_known_the_starts_stay(tmp_path: Path, change:
     data["set"] |= change
     rig = Rig(Identification(**data), tmp_path)
     begin = start_point(rig.task, logs)
-    point, start = regressed(rig, Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
+    point, start = regressed(Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
     assert point == begin and not start.found
     assert why in start.why_not
     assert "start values as given" in start.lines(rig.task.parameters)[0]
@@ -174,7 +174,7 @@ def test_where_the_torques_are_not_known_the_starts_stay(tmp_path: Path, change:
 def test_a_closed_loop_without_a_channel_of_its_torque_keeps_the_starts(tmp_path: Path) -> None:
     rig = write_servo_logs(tmp_path, TRUTH, rung=0, count=1)
     logs = [prepared(rig.task, log, rig.units) for log in read_all(rig.task, tmp_path)]
-    _, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    _, start = regressed(Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
     assert "under its controller, and no channel shows its torque" in start.why_not
 
 
@@ -194,7 +194,7 @@ def test_a_measured_torque_serves_in_a_closed_loop(tmp_path: Path) -> None:
     begin = start_point(rig.task, logs)
     known = ("torque_constant", "resistance", "dead_time")
     begin = ParameterPoint(begin.values | {name: truth[name] for name in known}, begin.nuisance)
-    _, start = regressed(rig, Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
+    _, start = regressed(Engine(rig, threads=1), logs, begin, free_on(rig.task, 0))
     for name in ("armature", "coulomb_friction"):
         assert start.found[name] == pytest.approx(truth[name], rel=0.15)
     assert "delay" in start.kept["dead_time"]
@@ -206,7 +206,7 @@ def test_pauses_leave_too_few_samples(tmp_path: Path) -> None:
     for log in axis_logs(rig, VALUES):
         gaps = 0.01 * np.floor(np.arange(len(log.time)) / 15)
         logs.append(replace(log, time=log.time + gaps, log=replace(log.log, time=log.time + gaps)))
-    _, start = regressed(rig, Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
+    _, start = regressed(Engine(rig, threads=1), logs, start_point(rig.task, logs), free_on(rig.task, 0))
     assert "too short" in start.why_not or "without a pause" in start.why_not
 
 
@@ -341,7 +341,7 @@ def test_logs_with_a_speed_alone_get_start_values(tmp_path: Path, factor: float)
     rig = Rig(spindle_task(tmp_path, factor), tmp_path)
     log = spindle_log(rig)
     start = start_point(rig.task, [log])
-    point, report = regressed(rig, Engine(rig, threads=1), [log], start, rig.task.parameters)
+    point, report = regressed(Engine(rig, threads=1), [log], start, rig.task.parameters)
     assert set(report.found) == {"inertia", "viscous", "coulomb"}
     assert point.values["inertia"] == pytest.approx(2e-3, rel=0.1)
     assert point.values["viscous"] == pytest.approx(0.01, rel=0.1)

@@ -24,7 +24,7 @@ import test_identification_logs as logs
 from lostmotion.cli import app
 from lostmotion.identification.readers import servo_json_logs, spreadsheet_logs, text_logs
 from lostmotion.identification.readers.channel_conversions import conversion_of
-from lostmotion.identification.readers.log_files import TABLES, read_log
+from lostmotion.identification.readers.log_files import READERS, read_log
 from lostmotion.inputs.limits import memory_limit, size_of
 
 TIME = np.arange(200) * 0.01
@@ -57,7 +57,7 @@ class Command:
         return os.mkdir, (str(self.mark),)
 
 
-@pytest.mark.parametrize("ending", [".json", *TABLES])
+@pytest.mark.parametrize("ending", READERS)
 def test_no_importer_unpickles(tmp_path: Path, ending: str) -> None:
     path = tmp_path / f"log{ending}"
     path.write_bytes(pickle.dumps(Command(tmp_path / "mark")))

@@ -82,13 +82,13 @@ def begun_with(task: Identification, train: Sequence[Prepared]) -> list[Prepared
 
 
 def climb(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: ParameterPoint, notify: Notify, models: Models
+    engine: Engine, logs: Sequence[Prepared], start: ParameterPoint, notify: Notify, models: Models
 ) -> list[RungResult]:
     """Fit all candidate models, one after the other.
 
     models: the models that an interrupted identification has fitted: the search goes on from their values.
     """
-    task = rig.task
+    task = engine.rig.task
     train = [log for log in logs if not log.held_out]
     if not train:
         raise InputError(
@@ -97,47 +97,43 @@ def climb(
     found: list[RungResult] = []
     point = start
     for rung, entry in enumerate(task.rungs()):
-        kept = models.fitted(entry.name)
+        problem, kept = problem_of(engine, train, rung), models.fitted(entry.name)
         if kept is not None:
-            minima = kept[1]
-            best = search(problem_of(rig, engine, train, rung), kept[0], iterations=task.fit.iterations)
+            best, minima = search(problem, kept[0]), kept[1]
         else:
-            best, minima = _rung(rig, engine, train, rung, point, found[-1].fit if found else None, notify)
+            best, minima = _rung(problem, point, found[-1].fit if found else None, notify)
             models.keep(entry.name, best.point, minima)
-        point = best.point
-        best.point = point = with_own(rig, engine, logs, point, rung)
-        unsure = undetermined(problem_of(rig, engine, train, rung), best)
+        best.point = point = with_own(engine, logs, best.point, rung)
         errors = log_errors(logs, engine.residuals(logs, point, rung))
-        means = mean_errors(task, errors, best)
-        found.append(RungResult(entry.name, best, errors, *means, engine.failed, unsure, minima))
+        means, failed = mean_errors(task, errors, best), engine.failed
+        found.append(RungResult(entry.name, best, errors, *means, failed, undetermined(problem, best), minima))
     return found
 
 
 def _rung(
-    rig: Rig, engine: Engine, train: list[Prepared], rung: int, point: ParameterPoint, below: Fit | None, notify: Notify
+    problem: FitProblem, point: ParameterPoint, below: Fit | None, notify: Notify
 ) -> tuple[Fit, list[ParameterPoint]]:
     """(fit of a candidate model, other minima), begun at the values of the model before."""
-    task, entry = rig.task, rig.rungs()[rung]
-    added = {n: p for n, p in free_on(task, rung).items() if rung == 0 or n not in free_on(task, rung - 1)}
+    engine, rung = problem.engine, problem.rung
+    rig, entry = engine.rig, engine.rig.rungs()[rung]
+    added = {n: p for n, p in problem.parameters.items() if rung == 0 or n not in free_on(rig.task, rung - 1)}
     if rung > 0:
         point = replace(point, values=point.values | {n: p.start for n, p in added.items()})
     best: Fit | None = None
-    problem = problem_of(rig, engine, train, rung)
-    for tried in _starts(point, entry.multi_start):
-        fit = _one(rig, engine, train, rung, tried, entry.name, notify)
+    for tried in itertools.product(*entry.multi_start.values()):
+        values = point.values | dict(zip(entry.multi_start, tried, strict=True))
+        fit = _one(problem, replace(point, values=values), notify)
         if best is None or _cost(problem, fit, best) < best.cost:
             best = fit
     assert best is not None
-    if below is not None and _cost(problem_of(rig, engine, train, rung - 1), below, best) < best.cost * (1.0 - 1e-9):
+    if below is not None and _cost(problem_of(engine, problem.logs, rung - 1), below, best) < best.cost * (1.0 - 1e-9):
         # The model contains the one before: begin there, with the new parameters switched off.
         off = {n: p.off if p.off is not None else p.start for n, p in added.items()}
-        again = _one(
-            rig, engine, train, rung, replace(below.point, values=below.point.values | off), entry.name, notify
-        )
+        again = _one(problem, replace(below.point, values=below.point.values | off), notify)
         if _cost(problem, again, best) < best.cost:
             best = again
     rough = [name for name in added if name not in entry.multi_start and is_rough(rig, name, rung)]
-    return _other_minima(rig, engine, train, rung, point, best, rough, notify)
+    return _other_minima(problem, point, best, rough, notify)
 
 
 def is_rough(rig: Rig, name: str, rung: int) -> bool:
@@ -147,37 +143,31 @@ def is_rough(rig: Rig, name: str, rung: int) -> bool:
 
 
 def _other_minima(
-    rig: Rig,
-    engine: Engine,
-    train: list[Prepared],
-    rung: int,
-    first: ParameterPoint,
-    best: Fit,
-    names: Sequence[str],
-    notify: Notify,
+    problem: FitProblem, first: ParameterPoint, best: Fit, names: Sequence[str], notify: Notify
 ) -> tuple[Fit, list[ParameterPoint]]:
     """(best fit, points of other minima that are as good) from several values of parameters on which the motion does not depend smoothly.
 
     Nothing is tried where the residuals of the fit are the noise that the task states.
     """
-    problem = problem_of(rig, engine, train, rung)
-    if not names or explained(problem, engine.residuals(train, best.point, rung)):
+
+    def is_explained() -> bool:
+        return explained(problem, problem.engine.residuals(problem.logs, best.point, problem.rung))
+
+    if not names or is_explained():
         return best, []
     others: list[Fit] = []
 
     def starts() -> Iterator[ParameterPoint]:
-        for k, name in enumerate(names):
-            if k == 0:
-                yield grown(problem, first)
+        yield grown(problem, first)
+        for name in names:
             for value in _promising(problem, best, name):
                 yield grown(problem, replace(best.point, values=best.point.values | {name: value}))
 
     for start in starts():
-        fit = _one(rig, engine, train, rung, start, rig.rungs()[rung].name, notify)
-        others.append(fit)
-        if _cost(problem, fit, best) < best.cost * (1.0 - LOWER):
-            others[-1], best = best, fit
-        if explained(problem, engine.residuals(train, best.point, rung)):
+        others.append(_one(problem, start, notify))
+        if _cost(problem, others[-1], best) < best.cost * (1.0 - LOWER):
+            others[-1], best = best, others[-1]
+        if is_explained():
             break
     scale = 1.0 if problem.given is None else max(1.0, (NORMAL * best.mae) ** 2)  # errors above those stated
     return best, [fit.point for fit in others if _cost(problem, fit, best) - best.cost < CHI_SQUARE * scale]
@@ -188,7 +178,7 @@ def grown(problem: FitProblem, start: ParameterPoint) -> ParameterPoint:
     for share in PARTS:
         logs = [log.part(0, max(LEAST, round(share * len(log.time)))) for log in problem.logs]
         if all(log.valid.any(axis=1).all() for log in logs):
-            start = search(replace(problem, logs=logs), start, iterations=problem.options.iterations).point
+            start = search(replace(problem, logs=logs), start).point
     return start
 
 
@@ -218,57 +208,34 @@ def _cost(problem: FitProblem, fit: Fit, other: Fit) -> float:
     return problem.cost(residuals, other.deviations, fit.point, other.correlation)
 
 
-def with_own(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> ParameterPoint:
+def with_own(engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> ParameterPoint:
     """Fit the nuisances of a held-out log, such as its zero; the parameters stay."""
     held_out = [log for log in logs if log.held_out]
-    if not rig.task.nuisance or not held_out:
+    if not engine.rig.task.nuisance or not held_out:
         return point
     engine.residuals(held_out, point, rung)
     able = [log for log in held_out if log.name not in engine.failed]
-    if not able:
-        return point
-    return search(replace(problem_of(rig, engine, able, rung), parameters={}), point, iterations=10).point
+    return search(replace(problem_of(engine, able, rung), parameters={}), point, iterations=10).point if able else point
 
 
-def _starts(point: ParameterPoint, tried: dict[str, tuple[float, ...]]) -> Iterator[ParameterPoint]:
-    for values in itertools.product(*tried.values()):
-        yield replace(point, values=point.values | dict(zip(tried, values, strict=True)))
-
-
-def _one(
-    rig: Rig, engine: Engine, train: list[Prepared], rung: int, start: ParameterPoint, name: str, notify: Notify
-) -> Fit:
+def _one(problem: FitProblem, start: ParameterPoint, notify: Notify) -> Fit:
     """Some logs first, in windows that become longer where the task says so, then all."""
-    options = rig.task.fit
-    few = begun_with(rig.task, train)
+    rig = problem.engine.rig
+    name, few = rig.rungs()[problem.rung].name, begun_with(rig.task, problem.logs)
 
     def tell(iteration: int, cost: float) -> None:
         notify(name, iteration, cost)
 
-    fit = _some(rig, engine, few, rung, start, tell)
-    if len(few) == len(train):
-        return fit
-    return search(problem_of(rig, engine, train, rung), fit.point, iterations=options.iterations, notify=tell)
+    for length in problem.options.horizon:
+        cut = windows(rig, few, start, problem.rung, length)
+        start = search(replace(problem, logs=cut), start, notify=tell).point
+    fit = search(replace(problem, logs=few), start, notify=tell)
+    return fit if len(few) == len(problem.logs) else search(problem, fit.point, notify=tell)
 
 
-def _some(
-    rig: Rig,
-    engine: Engine,
-    few: Sequence[Prepared],
-    rung: int,
-    start: ParameterPoint,
-    tell: Callable[[int, float], None],
-) -> Fit:
-    options = rig.task.fit
-    for length in options.horizon:
-        cut = windows(rig, few, start, rung, length)
-        start = search(problem_of(rig, engine, cut, rung), start, iterations=options.iterations, notify=tell).point
-    return search(problem_of(rig, engine, few, rung), start, iterations=options.iterations, notify=tell)
-
-
-def first_fit(rig: Rig, engine: Engine, few: Sequence[Prepared], start: ParameterPoint, notify: Notify) -> Fit:
+def first_fit(engine: Engine, few: Sequence[Prepared], start: ParameterPoint, notify: Notify) -> Fit:
     """Fit of the first candidate model to the logs with which a search begins."""
-    return _some(rig, engine, few, 0, start, lambda iteration, cost: notify(rig.rungs()[0].name, iteration, cost))
+    return _one(problem_of(engine, few, 0), start, notify)
 
 
 def mean_errors(task: Identification, errors: list[LogError], fit: Fit) -> tuple[float, float]:

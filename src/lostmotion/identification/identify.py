@@ -133,9 +133,7 @@ def identify_logs(
     while True:
         found = _climbed(rig, logs, threads, notify, kept, found)
         odd = {**{n: o for n, o in odd.items() if n in gone}, **{o.log: o for o in found.odd}}
-        shared = shared_faults(
-            found.engine.rig, found.engine, list(every.values()), list(odd.values()), found.agreed, found.best
-        )
+        shared = shared_faults(found.engine, list(every.values()), list(odd.values()), found.agreed, found.best)
         of_model |= {family(odd[s.logs[0]].fault) for s in shared}
         odd = {n: replace(o, shared=family(o.fault) in of_model) for n, o in odd.items()}
         drop = {n for n, o in odd.items() if o.left_out}
@@ -148,9 +146,8 @@ def identify_logs(
     result.odd, result.shared = list(odd.values()), shared
     errors = {e.log: e.mae for e in result.errors if e.channel == next(iter(rig.task.measured))}
     result.kinds = kinds(result.logs, errors, result.odd)
-    result.conditions = left_out_errors(
-        result.rig or rig, Engine(result.rig or rig, threads), result.logs, result.fit, result.chosen, notify
-    )
+    engine = Engine(result.rig or rig, threads)
+    result.conditions = left_out_errors(engine, result.logs, result.fit, result.chosen, notify)
     return result
 
 
@@ -186,7 +183,7 @@ def _climbed(
     logs = [replace(log, cache={}) for log in logs]
     while True:
         engine = Engine(rig, threads)
-        rungs = climb(rig, engine, logs, point, notify, progress.of(rig.task, logs, kept))
+        rungs = climb(engine, logs, point, notify, progress.of(rig.task, logs, kept))
         best = chosen(rungs)
         turned = _turned(engine, logs, rungs[best].fit, best, undecided)
         if turned is None:
@@ -195,7 +192,7 @@ def _climbed(
         ways, undecided = ways | words, ()
         logs = [replace(log, cache={}) for log in logs]
         point, start = _start(rig, logs, threads)
-    odd, agreed = odd_logs(rig, engine, logs, point, rungs[best].fit, best)
+    odd, agreed = odd_logs(engine, logs, point, rungs[best].fit, best)
     return _Climbed(engine, logs, start, ways, rungs, best, odd, agreed)
 
 
@@ -207,14 +204,12 @@ def _turned(
     The way was chosen at the first values, which may be so far off that the residuals of both ways say nothing.
     """
     rig, train = engine.rig, [log for log in logs if not log.held_out]
-    if not undecided or explained(problem_of(rig, engine, train, rung), engine.residuals(train, fit.point, rung)):
+    if not undecided or explained(problem_of(engine, train, rung), engine.residuals(train, fit.point, rung)):
         return None
     ways: dict[str, Way] = {name: rig.task.inputs[name].interpolation or "hold" for name in undecided}
 
     def fitted(other: Rig, some: list[Prepared], point: ParameterPoint) -> Fit:
-        return search(
-            problem_of(other, Engine(other, engine.threads), some, rung), point, iterations=rig.task.fit.iterations
-        )
+        return search(problem_of(Engine(other, engine.threads), some, rung), point)
 
     other, _, words = nearer_ways(rig, train, ways, fit.point, fitted)
     return None if other is rig else (other, words)
@@ -226,7 +221,7 @@ def _answer(found_by: _Climbed, profiles: bool) -> IdentificationResult:
     rig, task = engine.rig, engine.rig.task
     fit, free = rungs[best].fit, free_on(task, best)
     train = [log for log in logs if not log.held_out]
-    problem: FitProblem = problem_of(rig, engine, train, best)
+    problem = problem_of(engine, train, best)
     residuals = engine.residuals(train, fit.point, best)
     misfit = with_shapes(problem, fit.point, residuals, misfits(problem, residuals))
     intervals, found = _intervals(problem, fit, misfit, rungs[best].minima, profiles)
@@ -262,7 +257,7 @@ def _begun(
     if undecided and train:
 
         def fitted(rig: Rig, logs: list[Prepared], start: ParameterPoint) -> Fit:
-            return first_fit(rig, Engine(rig, threads), logs, start, notify)
+            return first_fit(Engine(rig, threads), logs, start, notify)
 
         rig, point, more = nearer_ways(rig, begun_with(rig.task, train), undecided, point, fitted)
         ways |= more
@@ -274,7 +269,7 @@ def _start(rig: Rig, logs: list[Prepared], threads: int | None) -> tuple[Paramet
     point, train = start_point(rig.task, logs), [log for log in logs if not log.held_out]
     if not rig.task.fit.regression or not train:
         return point, Regression()
-    return regressed(rig, Engine(rig, threads), begun_with(rig.task, train), point, free_on(rig.task, 0))
+    return regressed(Engine(rig, threads), begun_with(rig.task, train), point, free_on(rig.task, 0))
 
 
 def _intervals(

@@ -14,7 +14,6 @@ from .fit.least_squares import Fit, problem_of, search
 from .fit.log_errors import log_errors
 from .prepared_log import Prepared
 from .rig.residuals import Engine
-from .rig.rig_scenario import Rig
 
 Notify = Callable[[str, int, float], None]
 
@@ -44,12 +43,7 @@ class ConditionError:
         return f"{self.key} = {shown}"
 
     def text(self, unit: str, factor: float) -> str:
-        """One line.
-
-        unit: in which errors are printed.
-
-        factor: how many of them one SI unit is.
-        """
+        """One line, with errors in a unit; one SI unit has so many of it."""
         unit = f" {unit}".rstrip()
         without = self.failed or f"{factor * self.left_out:.4g}{unit} when fitted without them"
         logs = f"{self.logs} log{'' if self.logs == 1 else 's'}"
@@ -57,7 +51,7 @@ class ConditionError:
 
 
 def left_out_errors(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], fit: Fit, rung: int, notify: Notify
+    engine: Engine, logs: Sequence[Prepared], fit: Fit, rung: int, notify: Notify
 ) -> list[ConditionError]:
     """Errors of the fitted logs of each condition that ``fit.leave_out`` names, with and without them in the fit.
 
@@ -66,19 +60,19 @@ def left_out_errors(
     """
     train = [log for log in logs if not log.held_out]
     found = []
-    for key in rig.task.fit.leave_out:
+    task = engine.rig.task
+    for key in task.fit.leave_out:
         for value in sorted({log.facts[key] for log in train}, key=lambda v: (isinstance(v, str), v)):
             out = [log for log in train if log.facts[key] == value]
             rest = [log for log in train if log.facts[key] != value]
             residuals = engine.residuals(out, fit.point, rung)
-            before, _ = mean_errors(rig.task, log_errors(out, residuals), fit)
+            before, _ = mean_errors(task, log_errors(out, residuals), fit)
             own = ConditionError(key, value, len(out), before, math.nan, "no other log was fitted")
-            found.append(_fitted_without(rig, engine, own, out, rest, fit, rung, notify) if rest else own)
+            found.append(_fitted_without(engine, own, out, rest, fit, rung, notify) if rest else own)
     return found
 
 
 def _fitted_without(
-    rig: Rig,
     engine: Engine,
     condition: ConditionError,
     out: Sequence[Prepared],
@@ -92,17 +86,14 @@ def _fitted_without(
     name = f"without {condition.name}"
     try:
         again = search(
-            problem_of(rig, engine, rest, rung),
-            fit.point,
-            iterations=rig.task.fit.iterations,
-            notify=lambda iteration, cost: notify(name, iteration, cost),
+            problem_of(engine, rest, rung), fit.point, notify=lambda iteration, cost: notify(name, iteration, cost)
         )
-        point = with_own(rig, engine, unseen, again.point, rung)
+        point = with_own(engine, unseen, again.point, rung)
         residuals = engine.residuals(unseen, point, rung)
     except InputError as problem:
         return replace(condition, failed=f"no fit without them: {problem}")
     if engine.failed:
         log, why = next(iter(engine.failed.items()))
         return replace(condition, failed=f"no run when fitted without them ({log}: {why})")
-    _, error = mean_errors(rig.task, log_errors(unseen, residuals), fit)
+    _, error = mean_errors(engine.rig.task, log_errors(unseen, residuals), fit)
     return replace(condition, left_out=error, failed="")

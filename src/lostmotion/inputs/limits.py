@@ -43,7 +43,7 @@ def memory_limit(default: int = LOG) -> int:
         raise InputError(f"{VARIABLE}: {text!r} {error}") from None
 
 
-def check_memory(needed: float, what: str, default: int = LOG) -> None:
+def check_memory(needed: float, what: str = "", default: int = LOG) -> None:
     """Refuse an input that needs more memory than the limit.
 
     needed: bytes.

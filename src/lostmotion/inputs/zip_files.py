@@ -3,31 +3,26 @@
 from __future__ import annotations
 
 import zipfile
-from pathlib import Path
 
 from ..errors import InputError
-from .limits import LOG, check_memory
+from .limits import check_memory
 
 METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}  # the others are decompressed without a limit by the library
 ENCRYPTED = 1  # flag of a member
 MOST = 10_000  # members
 
 
-def members(path: Path, archive: zipfile.ZipFile, limit: int = LOG) -> dict[str, zipfile.ZipInfo]:
+def members(archive: zipfile.ZipFile) -> dict[str, zipfile.ZipInfo]:
     """Members of an open archive by name, if all of them fit into memory; each is read up to the size that it announces."""
     found = archive.infolist()
     if len(found) > MOST:
-        raise InputError(
-            f"has {len(found)} members; {MOST} at most are read, leave out those that are no data", where=path
-        )
-    check_memory(float(sum(member.file_size for member in found)), str(path), limit)
+        raise InputError(f"has {len(found)} members; {MOST} at most are read, leave out those that are no data")
+    check_memory(float(sum(member.file_size for member in found)))
     for member in found:
         if member.flag_bits & ENCRYPTED:
-            raise InputError(f"{member.filename}: is encrypted; save the file without a password", where=path)
+            raise InputError(f"{member.filename}: is encrypted; save the file without a password")
         if member.compress_type not in METHODS:
-            raise InputError(
-                f"{member.filename}: is compressed by a method other than deflate; save it with deflate", where=path
-            )
+            raise InputError(f"{member.filename}: is compressed by a method other than deflate; save it with deflate")
     if len({member.filename for member in found}) < len(found):
-        raise InputError("has two members of one name; save it again", where=path)
+        raise InputError("has two members of one name; save it again")
     return {member.filename: member for member in found}

@@ -11,7 +11,6 @@ import numpy as np
 from ...errors import InputError
 from ..prepared_log import Prepared
 from ..rig.residuals import Engine, ParameterPoint
-from ..rig.rig_scenario import Rig
 from ..task.file_formulas import number
 from ..task.free_parameters import FreeParameter
 from ..task.identification_file import FitOptions, free_on
@@ -201,10 +200,15 @@ def correlation_of(residuals: Sequence[np.ndarray]) -> float:
 
 
 def search(
-    problem: FitProblem, start: ParameterPoint, *, iterations: int, notify: Callable[[int, float], None] | None = None
+    problem: FitProblem,
+    start: ParameterPoint,
+    *,
+    iterations: int = 0,
+    notify: Callable[[int, float], None] | None = None,
 ) -> Fit:
     """Levenberg-Marquardt from a point.
 
+    iterations: 0: as the task says.
     notify: is told the iteration and the cost.
     """
     both = {**problem.parameters, **problem.nuisance}
@@ -217,7 +221,7 @@ def search(
     point, damping, history = start, 1e-3, []
     names = list(problem.parameters)
     done = small = 0
-    for done in range(1, iterations + 1):
+    for done in range(1, (iterations or problem.options.iterations) + 1):
         deviations, correlation = problem.deviations(residuals), correlation_of(problem.compared(residuals))
         cost = problem.cost(residuals, deviations, point, correlation)
         history.append(cost)
@@ -285,9 +289,9 @@ def _stepped(problem: FitProblem, point: ParameterPoint, linear: _Linear, dampin
     return ParameterPoint(values, {**point.nuisance, **nuisance})
 
 
-def problem_of(rig: Rig, engine: Engine, logs: Sequence[Prepared], rung: int) -> FitProblem:
+def problem_of(engine: Engine, logs: Sequence[Prepared], rung: int) -> FitProblem:
     """Problem of fitting a candidate model to logs."""
-    task = rig.task
+    rig, task = engine.rig, engine.rig.task
     given = list(rig.deviations.values())
     deviations = None if None in given else np.array(given, dtype=float)
     resolution = np.array([number(m.resolution, {}, "measured.resolution") for m in task.measured.values()])

@@ -51,17 +51,14 @@ class Regression:
 
 
 def regressed(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, free: Mapping[str, FreeParameter]
+    engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, free: Mapping[str, FreeParameter]
 ) -> tuple[ParameterPoint, Regression]:
-    """Start values of the first candidate model.
-
-    logs: that are fitted.
-    free: parameters of the first candidate model.
-    """
+    """Start values of the first candidate model with its free parameters, for logs that are fitted."""
+    rig = engine.rig
     try:
         shown = shown_motion(rig)
         judged = _windows_or_logs(rig, logs, point)
-        best, report, error = point, Regression(), _error(rig, engine, judged, point)
+        best, report, error = point, Regression(), _error(engine, judged, point)
         refusal, solved = "", False
         for width in WIDTHS:
             try:
@@ -71,7 +68,7 @@ def regressed(
                 continue
             solved = solved or bool(values)
             there = ParameterPoint({**point.values, **values}, point.nuisance)
-            if values and (new := _error(rig, engine, judged, there)) < error:
+            if values and (new := _error(engine, judged, there)) < error:
                 best, report, error = there, Regression(values, kept), new
     except InputError as problem:
         return point, Regression(why_not=str(problem))
@@ -92,9 +89,9 @@ def _windows_or_logs(rig: Rig, logs: Sequence[Prepared], point: ParameterPoint) 
         return logs
 
 
-def _error(rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint) -> float:
+def _error(engine: Engine, logs: Sequence[Prepared], point: ParameterPoint) -> float:
     """Mean absolute residual in units of the deviations."""
-    units = np.array([deviation or 1.0 for deviation in rig.deviations.values()])[:, None]
+    units = np.array([deviation or 1.0 for deviation in engine.rig.deviations.values()])[:, None]
     rows = [np.abs(r / units).ravel() for r in engine.residuals(logs, point, 0)]
     error = float(np.mean(np.concatenate(rows)))
     return error if np.isfinite(error) else np.inf

@@ -225,7 +225,7 @@ def _with_courses(rig: Rig, parts: Sequence[Prepared]) -> tuple[Rig, list[str]]:
         reference, some = _at_start(rig), [replace(part, held_out=False) for part in parts[:FIRST]]
 
         def fitted(other: Rig, logs: list[Prepared], point: ParameterPoint) -> Fit:
-            problem = problem_of(other, Engine(other, 1), logs, reference.rung)
+            problem = problem_of(Engine(other, 1), logs, reference.rung)
             return search(replace(problem, parameters=reference.free), point, iterations=ITERATIONS)
 
         with suppress(InputError):  # a log without a run: it is named with its estimate
@@ -271,7 +271,7 @@ def _at_start(rig: Rig) -> _Reference:
                 f'is not free in the model "{names[rung]}"; name another monitor.model', f"monitor.watch.{name}"
             )
     values = {n: p.start if n in sought or p.fixed or p.off is None else p.off for n, p in task.parameters.items()}
-    deviations = problem_of(rig, Engine(rig, 1), [], rung).given
+    deviations = problem_of(Engine(rig, 1), [], rung).given
     return _Reference(rig, rung, values, _with_priors(task, rung, values), deviations, deviations is not None)
 
 
@@ -348,7 +348,7 @@ class _Estimator:
 
     def _problem(self, parts: Sequence[Prepared]) -> FitProblem:
         r = self.reference
-        problem = problem_of(r.rig, self._engine, [replace(part, held_out=False) for part in parts], r.rung)
+        problem = problem_of(self._engine, [replace(part, held_out=False) for part in parts], r.rung)
         return replace(problem, parameters=r.free, given=r.deviations)
 
     def _fit(self, problem: FitProblem) -> tuple[Fit, list[np.ndarray]]:

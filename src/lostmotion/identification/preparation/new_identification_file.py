@@ -20,7 +20,7 @@ from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
 from ..readers.channel_units import channel_unit
 from ..readers.log import Log
-from ..readers.log_files import ENDINGS, read_log
+from ..readers.log_files import READERS, read_log
 from ..rig.rig_scenario import units_of
 from .prepare import alike
 from .screening import screened
@@ -180,11 +180,11 @@ def _files(directory: Path) -> list[Path]:
     found = []
     for folder, inner, names in os.walk(directory):
         inner[:] = sorted(name for name in inner if not name.startswith("."))
-        found += [Path(folder, name) for name in sorted(names) if Path(name).suffix.lower() in ENDINGS]
+        found += [Path(folder, name) for name in sorted(names) if Path(name).suffix.lower() in READERS]
         if len(found) > MOST_LOGS:
             raise InputError(f"{directory}: has more than {MOST_LOGS} logs; name a directory with some of them")
     if not found:
-        raise InputError(f"{directory}: has no log; logs end in {', '.join(ENDINGS)}")
+        raise InputError(f"{directory}: has no log; logs end in {', '.join(READERS)}")
     return found
 
 

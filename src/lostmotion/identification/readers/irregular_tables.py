@@ -11,7 +11,6 @@ import re
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -30,9 +29,7 @@ TIME_OF = "time of "
 Number = Callable[[Any], float | None]
 
 
-def odd_table_log(
-    path: Path, rows: Sequence[TableRow], number: Number, comments: list[str], time: str
-) -> tuple[int, Log]:
+def odd_table_log(rows: Sequence[TableRow], number: Number, comments: list[str], time: str) -> tuple[int, Log]:
     """(number of lines and cells that are lost, the log).
 
     rows, number, comments, time: as in `table_log`.
@@ -50,7 +47,7 @@ def odd_table_log(
     kept, lost, notes, words = _mended(
         [str(cell) for cell in heading[0][1]] if heading else [], body, width, number, time
     )
-    log = table_log(path, iter([*heading, *kept]), number, comments, time)
+    log = table_log(iter([*heading, *kept]), number, comments, time)
     if pairs:
         log = _on_one_clock(log)
     channels = {

@@ -8,7 +8,6 @@ import sys
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -25,14 +24,14 @@ def reason(error: Exception) -> str:
 
 
 @contextmanager
-def as_refusal(path: Path, what: str, remedy: str = "") -> Iterator[None]:
+def as_refusal(what: str, remedy: str = "") -> Iterator[None]:
     """Whatever a library raises about a file, as one message: `what` the file is not, the reason, and a remedy."""
     try:
         yield
     except (InputError, ImportError):
         raise
     except Exception as error:  # the library raises what its parts raise
-        raise InputError(f"{what} ({reason(error)}){remedy}", where=path) from None
+        raise InputError(f"{what} ({reason(error)}){remedy}") from None
 
 
 @contextmanager

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
-from ...errors import InputError
+from ...errors import InputError, prefixed
 from ...inputs.arguments import checked
 from ...inputs.limits import check_memory
 from .log import Log
@@ -16,7 +17,9 @@ from .servo_json_logs import read_servo_json
 from .spreadsheet_logs import read_xlsx_log
 from .text_logs import read_text_log
 
-TABLES: dict[str, Callable[..., Log]] = {
+READERS: dict[str, Callable[..., Log]] = {
+    ".json": read_servo_json,
+    ".jsonl": read_servo_json,
     ".csv": read_text_log,
     ".txt": read_text_log,
     ".tsv": read_text_log,
@@ -34,66 +37,67 @@ TABLES: dict[str, Callable[..., Log]] = {
     ".bag": read_ros_bag,
     ".db3": read_ros_bag,
 }
-ENDINGS = (".json", ".jsonl", *TABLES)
 
 
 @checked
 def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
     """Read a log of any of the formats in ``docs/identification.md``, by the ending of its name.
 
-    Parameters
-    ----------
-    path : str or Path
-        File of the log.
-    time : str
-        Name of the channel of the time, if it is not found automatically. For an MCAP file or a bag: the topic, or
-        ``TOPIC.header.stamp``.
-    decimal : str
-        Decimal separator in text, ``"."`` or ``","``. If empty, a comma is taken only if the text has no other reading, and the log
-        has a note on it.
+        Parameters
+        ----------
+        path : str or Path
+            File of the log.
+        time : str
+            Name of the channel of the time, if it is not found automatically. For an MCAP file or a bag: the topic, or
+            ``TOPIC.header.stamp``.
+        decimal : str
+            Decimal separator in text, ``"."`` or ``","``. If empty, a comma is taken only if the text has no other reading, and the log
+            has a note on it.
 
-    Returns
-    -------
-    Log
-        Channels with units, header and notes.
+        Returns
+        -------
+        Log
+            Channels with units, header and notes.
 
-    Raises
-    ------
-    InputError
-        The file cannot be read, or needs more memory than the limit. The message names the file and the remedy.
-    MissingLibraryError
-        The library of the format is not installed.
+        Raises
+        ------
+        InputError
+            The file cannot be read, or needs more memory than the limit. The message names the file and the remedy.
+        MissingLibraryError
+            The library of the format is not installed.
 
-    Examples
-    --------
-    >>> from pathlib import Path
-    >>> from tempfile import TemporaryDirectory
-    >>> import lostmotion as lm
-    >>> with TemporaryDirectory() as folder:
-    ...     path = Path(folder, "log.csv")
-    ...     _ = path.write_text("time [s],angle [deg]\\n0.0,0\\n0.1,1\\n0.2,3\\n")
-    ...     log = lm.identification.read_log(path)
-    >>> [channel for channel in log.channels]
-    ['angle']
+        Examples
+        --------
+        >>> from dataclasses import replace
+    from pathlib import Path
+        >>> from tempfile import TemporaryDirectory
+        >>> import lostmotion as lm
+        >>> with TemporaryDirectory() as folder:
+        ...     path = Path(folder, "log.csv")
+        ...     _ = path.write_text("time [s],angle [deg]\\n0.0,0\\n0.1,1\\n0.2,3\\n")
+        ...     log = lm.identification.read_log(path)
+        >>> [channel for channel in log.channels]
+        ['angle']
     """
     path = Path(path)
     if decimal not in ("", ".", ","):
         raise InputError(f'argument decimal: {decimal!r} is neither "." nor ","; leave it out to have it found')
-    if path.is_dir():
-        raise InputError("is a directory; name the logs in it", where=path)
-    if not path.exists():
-        raise InputError("there is no such file; check the name", where=path)
-    if not path.is_file():
-        raise InputError("is a device or a pipe; name a file", where=path)
-    ending = path.suffix.lower()
-    check_memory(path.stat().st_size, str(path))
-    if ending in (".json", ".jsonl"):
-        return read_servo_json(path, time=time)
-    if ending not in TABLES:
-        raise InputError(f"is no log by its ending; logs end in {', '.join(ENDINGS)}", where=path)
-    if TABLES[ending] is read_text_log:
-        return read_text_log(path, time=time, decimal=decimal)
-    return TABLES[ending](path, time=time)
+    reader = READERS.get(path.suffix.lower())
+    with prefixed(path):
+        if path.is_dir():
+            raise InputError("is a directory; name the logs in it")
+        if not path.exists():
+            raise InputError("there is no such file; check the name")
+        if not path.is_file():
+            raise InputError("is a device or a pipe; name a file")
+        check_memory(path.stat().st_size)
+        if reader is None:
+            raise InputError(f"is no log by its ending; logs end in {', '.join(READERS)}")
+        try:
+            log = reader(path, time, decimal) if reader is read_text_log else reader(path, time)
+        except OSError as error:
+            raise InputError(f"cannot be read: {error.strerror}") from None
+    return replace(log, name=path.name)
 
 
 def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
@@ -119,4 +123,4 @@ def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
 
 
 def _within(directory: Path) -> list[Path]:
-    return sorted(p for p in directory.iterdir() if p.suffix.lower() in ENDINGS and p.is_file())
+    return sorted(p for p in directory.iterdir() if p.suffix.lower() in READERS and p.is_file())

@@ -10,7 +10,6 @@ from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import suppress
 from datetime import UTC, datetime
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -83,9 +82,7 @@ def _nanoseconds(cell: Any) -> tuple[int, bool] | None:
     return (86_400 * since.days + since.seconds) * 10**9 + fraction, zoned
 
 
-def table_log(
-    path: Path, rows: Iterator[TableRow], number: Callable[[Any], float | None], comments: list[str], time: str
-) -> Log:
+def table_log(rows: Iterator[TableRow], number: Callable[[Any], float | None], comments: list[str], time: str) -> Log:
     """The log that a table is.
 
     rows: those with something in them; a heading first, unless the first row is numbers, and a row of units below it.
@@ -107,21 +104,19 @@ def table_log(
     stamps = Stamps()
     table = _numbers(names, place, stamps, number, itertools.chain(ahead, rows))
     if len(table) < 2:
-        raise InputError(f"has {len(table)} rows of values; a log needs two rows at least", where=path)
+        raise InputError(f"has {len(table)} rows of values; a log needs two rows at least")
     header, units = _header(comments, number)
     units |= {name: unit for name, unit in columns if unit is not None}
     values = table[:, place]
     if stamps.count:
         if stamps.count < np.sum(np.isfinite(values)):
-            raise InputError(
-                f"column {shortened(names[place])} has time stamps and numbers; write all alike", where=path
-            )
+            raise InputError(f"column {shortened(names[place])} has time stamps and numbers; write all alike")
         if not stamps.zoned:
             notes.append("its time stamps have no zone; they are taken to be of one clock that is not set meanwhile")
     else:
-        values = values * seconds_of(path, units.get(names[place], ""))
+        values = values * seconds_of(units.get(names[place], ""))
     found = {name: Channel(table[:, k], units.get(name, "")) for k, name in enumerate(names) if k != place}
-    return Log(path.name, values, {n: c for n, c in found.items() if not _is_blank(n, c)}, header, tuple(notes))
+    return Log("", values, {n: c for n, c in found.items() if not _is_blank(n, c)}, header, tuple(notes))
 
 
 def _is_blank(name: str, channel: Channel) -> bool:
@@ -222,10 +217,10 @@ def _time_column(row: int, names: list[str], wanted: str) -> int:
     return next((lower.index(name) for name in TIME_NAMES if name in lower), 0)
 
 
-def seconds_of(path: Path, unit: str) -> float:
+def seconds_of(unit: str) -> float:
     """Seconds of a unit of time."""
     if unit.strip() not in SECONDS:
-        raise InputError(f"the unit {unit!r} of the time is none of {', '.join(filter(None, SECONDS))}", where=path)
+        raise InputError(f"the unit {unit!r} of the time is none of {', '.join(filter(None, SECONDS))}")
     return SECONDS[unit.strip()]
 
 

@@ -24,21 +24,18 @@ DEFLATE = (0, 1)  # plain and transposed
 
 def check_mdf_blocks(path: Path) -> None:
     """Refuse a file whose lists never end, or whose data need more memory than the limit."""
-    try:
-        with path.open("rb") as file:
-            if file.read(8).strip() not in (b"MDF", b"UnFinMF") or not file.read(8).startswith(b"4"):
-                raise InputError("is not an MDF 4 file; save it as MDF 4", where=path)
-            check_memory(_Blocks(path, file).needed(), str(path))
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
+    with path.open("rb") as file:
+        if file.read(8).strip() not in (b"MDF", b"UnFinMF") or not file.read(8).startswith(b"4"):
+            raise InputError("is not an MDF 4 file; save it as MDF 4")
+        check_memory(_Blocks(file).needed())
 
 
 class _Blocks:
-    def __init__(self, path: Path, file: BinaryIO) -> None:
-        self.path, self.file = path, file
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
 
     def damaged(self, why: str) -> InputError:
-        return InputError(f"is not an MDF file, or is damaged ({why}); record or copy it again", where=self.path)
+        return InputError(f"is not an MDF file, or is damaged ({why}); record or copy it again")
 
     def block(self, at: int) -> tuple[bytes, list[int], int]:
         """Id, links and length of the data of a block."""
@@ -140,10 +137,8 @@ class _Blocks:
         except struct.error:
             raise self.damaged(f"the block at byte {at} is cut off") from None
         if kind not in DEFLATE:
-            raise InputError(
-                "has data compressed by another method than deflate; save it with deflate", where=self.path
-            )
-        check_memory(max(announced, length), str(self.path))
+            raise InputError("has data compressed by another method than deflate; save it with deflate")
+        check_memory(max(announced, length))
         if EXPANSION * length > announced:
             try:
                 made = zlib.decompressobj().decompress(self.file.read(length), announced + 1)

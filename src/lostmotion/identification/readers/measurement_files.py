@@ -32,44 +32,41 @@ LONGEST_WORD = 65536  # [bytes] of an attribute of HDF5
 WAVEFORM = {"wf_increment", "wf_start_offset"}  # properties of a TDMS channel that holds its time
 
 
-def read_mat_log(path: Path, *, time: str = "") -> Log:
+def read_mat_log(path: Path, time: str) -> Log:
     """Read a MATLAB file: vectors of one length and columns of matrices are channels, single numbers and words the header.
 
     Version 7.3 is read by h5py, older ones by scipy.
     """
     if not _begins_with(path, b"MATLAB 7.3"):
-        return log_of_variables(path, _mat5_variables(path), {}, time)
+        return log_of_variables(_mat5_variables(path), {}, time)
     found, units, _ = _hdf5_variables(path, matlab=True)
-    return log_of_variables(path, found, units, time)
+    return log_of_variables(found, units, time)
 
 
-def read_hdf5_log(path: Path, *, time: str = "") -> Log:
+def read_hdf5_log(path: Path, time: str) -> Log:
     """Read an HDF5 file: datasets of one length are channels, attributes of the file and single values the header.
 
     The attribute ``units`` or ``unit`` of a dataset is its unit. Datasets in groups are named ``GROUP/NAME``; attributes of the group of
     the time belong to the header too.
     """
     found, units, attributes = _hdf5_variables(path, matlab=False)
-    log = log_of_variables(path, found, units, time)
+    log = log_of_variables(found, units, time)
     return replace(log, header={**log.header, **attributes})
 
 
 def _begins_with(path: Path, text: bytes) -> bool:
-    try:
-        with path.open("rb") as file:
-            return file.read(len(text)) == text
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
+    with path.open("rb") as file:
+        return file.read(len(text)) == text
 
 
 def _mat5_variables(path: Path) -> dict[str, Any]:
     need("scipy", "Reading MATLAB files", "identify")
     import scipy.io
 
-    check_memory(_mat5_bytes(path), str(path))
-    with as_refusal(path, "is not a MATLAB file", "; save it with -v7 or -v7.3"):
+    check_memory(_mat5_bytes(path))
+    with as_refusal("is not a MATLAB file", "; save it with -v7 or -v7.3"):
         listed = [(name, shape) for name, shape, kind in scipy.io.whosmat(str(path)) if kind in MATLAB_NUMBERS]
-        check_memory(8.0 * sum(math.prod(shape) for _, shape in listed), str(path))
+        check_memory(8.0 * sum(math.prod(shape) for _, shape in listed))
         data = scipy.io.loadmat(str(path), squeeze_me=True, variable_names=[name for name, _ in listed])
     return {name: value for name, value in data.items() if not name.startswith("__")}
 
@@ -103,8 +100,8 @@ def _hdf5_variables(path: Path, *, matlab: bool) -> tuple[dict[str, Any], dict[s
 
     found: dict[str, Any] = {}
     units: dict[str, str] = {}
-    with as_refusal(path, f"is not a {kind} file"), h5py.File(path, "r") as file:
-        for name, node in datasets(path, file, depth=0 if matlab else LEVELS).items():
+    with as_refusal(f"is not a {kind} file"), h5py.File(path, "r") as file:
+        for name, node in datasets(file, depth=0 if matlab else LEVELS).items():
             if matlab and node.dtype.kind in "biuf":
                 value = np.squeeze(node[()].T)
                 text = node.attrs.get("MATLAB_class", b"") == b"char"
@@ -138,7 +135,7 @@ def _attributes(node: Any) -> dict[str, Any]:
     return found
 
 
-def read_parquet_log(path: Path, *, time: str = "") -> Log:
+def read_parquet_log(path: Path, time: str) -> Log:
     """Read a Parquet table; a field's metadata ``unit`` is the unit of its column, other metadata of the table the header.
 
     Columns without numbers are not read.
@@ -153,10 +150,10 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             types.is_integer(kind) or types.is_floating(kind) or types.is_boolean(kind) or types.is_timestamp(kind)
         )
 
-    with as_refusal(path, "is not a Parquet file"), pq.ParquetFile(path) as file:
+    with as_refusal("is not a Parquet file"), pq.ParquetFile(path) as file:
         schema = file.schema_arrow
         names = [field.name for field in schema if is_read(field.type)]
-        check_memory(16.0 * len(names) * file.metadata.num_rows, str(path))
+        check_memory(16.0 * len(names) * file.metadata.num_rows)
         table = file.read(names)
     units = {f.name: (f.metadata or {}).get(b"unit", b"").decode() for f in schema}
     header = {k.decode(): v.decode() for k, v in (schema.metadata or {}).items() if not k.startswith(b"ARROW")}
@@ -167,13 +164,13 @@ def read_parquet_log(path: Path, *, time: str = "") -> Log:
             column = column.cast(pa.timestamp("ns")).cast(pa.int64())
             units[name] = "ns"
         columns[name] = column.to_numpy()
-    log = log_of_variables(path, columns, units, time)
+    log = log_of_variables(columns, units, time)
     return Log(
         log.name, log.time, log.channels, {**log.header, **{k: as_number(v) for k, v in header.items()}}, log.notes
     )
 
 
-def read_mdf_log(path: Path, *, time: str = "") -> Log:
+def read_mdf_log(path: Path, time: str) -> Log:
     """Read an MDF 4 file by asammdf: all channels at the instants of the channel `time`, or of the first.
 
     Algebraic conversions are read by `conversion_of`. Databases of buses that a file attaches are not read.
@@ -189,16 +186,16 @@ def read_mdf_log(path: Path, *, time: str = "") -> Log:
         except Exception as error:  # the library raises what its parts raise
             problem = reason(error)
     if problem:
-        raise InputError(f"is not an MDF file that asammdf reads ({problem})", where=path)
+        raise InputError(f"is not an MDF file that asammdf reads ({problem})")
     numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
     if not numbers:
-        raise InputError("has no channel of numbers", where=path)
+        raise InputError("has no channel of numbers")
     first = next((signal for signal in numbers if signal.name == time), numbers[0])
     clock = np.asarray(first.timestamps, dtype=float)
     channels = {
         s.name: Channel(np.interp(clock, s.timestamps, s.samples.astype(float)), str(s.unit or "")) for s in numbers
     }
-    log = Log(path.name, clock - clock[0], channels)
+    log = Log("", clock - clock[0], channels)
     return log.noted(f"asammdf reports: {said[0]}") if said else log
 
 
@@ -206,8 +203,8 @@ def _mdf_signals(path: Path) -> list[Any]:
     import asammdf
 
     with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
-        formulas = _formulas(path, file)
-        _check_mdf_memory(path, file)
+        formulas = _formulas(file)
+        _check_mdf_memory(file)
         masters = {(k, m) for k, m in file.masters_db.items()}
         places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
         return [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
@@ -216,7 +213,7 @@ def _mdf_signals(path: Path) -> list[Any]:
 Formulas = dict[tuple[int, int], Callable[[np.ndarray], np.ndarray]]
 
 
-def _formulas(path: Path, file: Any) -> Formulas:
+def _formulas(file: Any) -> Formulas:
     """Algebraic conversions by group and channel; they are taken out of the file, so that its library evaluates none."""
     found: Formulas = {}
     for k, group in enumerate(file.groups):
@@ -232,7 +229,7 @@ def _formulas(path: Path, file: Any) -> Formulas:
                 elif _has_formula(rule):
                     raise ValueError("is a table with a formula in it, which is not supported")
             except ValueError as error:
-                raise InputError(f"channel {channel.name}: its conversion {error}", where=path) from None
+                raise InputError(f"channel {channel.name}: its conversion {error}") from None
     return found
 
 
@@ -241,14 +238,14 @@ def _has_formula(rule: Any) -> bool:
     return any(one.conversion_type == ALGEBRAIC or _has_formula(one) for one in inner)
 
 
-def _check_mdf_memory(path: Path, file: Any) -> None:
+def _check_mdf_memory(file: Any) -> None:
     """Refuse channels that need more memory than the limit: raw values, physical ones, and instants of each."""
     needed = 0.0
     for group in file.groups:
         about = group.channel_group
         record = about.samples_byte_nr + about.invalidation_bytes_nr
         needed += float(about.cycles_nr) * (record + 24.0 * len(group.channels))
-    check_memory(needed, str(path))
+    check_memory(needed)
 
 
 def _is_plain(file: Any, at: tuple[int, int]) -> bool:
@@ -269,7 +266,7 @@ def _signal(file: Any, name: str, at: Sequence[tuple[int, int]], formulas: Formu
     return signal
 
 
-def read_tdms_log(path: Path, *, time: str = "") -> Log:
+def read_tdms_log(path: Path, time: str) -> Log:
     """Read a TDMS file by npTDMS: the channels of all groups; their time is a channel, or increments of the waveform.
 
     Channels without numbers are not read.
@@ -280,13 +277,13 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
     variables: dict[str, Any] = {}
     units = {}
     with (
-        as_refusal(path, "is not a TDMS file"),
+        as_refusal("is not a TDMS file"),
         warnings_of("nptdms") as said,
         path.open("rb") as stream,
         nptdms.TdmsFile.open(stream) as file,
     ):
         channels = [c for group in file.groups() for c in group.channels() if c.dtype.kind in "biuf"]
-        check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels), str(path))
+        check_memory(sum(float(len(c)) * (c.dtype.itemsize + 8.0) for c in channels))
         for channel in channels:
             variables[channel.name] = np.asarray(channel[:])
             units[channel.name] = str(channel.properties.get("unit_string", ""))
@@ -294,11 +291,11 @@ def read_tdms_log(path: Path, *, time: str = "") -> Log:
                 variables["time"] = channel.time_track()
         properties = file.properties
     variables |= {name: value for name, value in properties.items() if isinstance(value, int | float | str)}
-    log = log_of_variables(path, variables, units, time)
+    log = log_of_variables(variables, units, time)
     return log.noted(f"may be cut off or damaged; npTDMS reports: {said[0]}") if said else log
 
 
-def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[str, str], time: str) -> Log:
+def log_of_variables(variables: Mapping[str, Any], units: Mapping[str, str], time: str) -> Log:
     """The log of named values: vectors and columns of matrices of the length of the time are channels, single values the header.
 
     The columns of a matrix ``x`` are ``x column 1``, ``x column 2`` and so on. If the file holds nothing but one matrix, its first column
@@ -319,9 +316,7 @@ def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[st
     if clock is None:
         known = [*vectors, *(column for columns in of_matrix.values() for column in columns)]
         meant = did_you_mean(name or "time", known, f"its vectors are {listed(known) or 'none'}")
-        raise InputError(
-            f"has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}", where=path
-        )
+        raise InputError(f"has no vector of the time{f' {name}' if name else ''}; name it with logs.time; {meant}")
     values = clock.astype(float) * {"ns": 1e-9, "us": 1e-6, "ms": 1e-3}.get(units.get(name, ""), 1.0)
     if units.get(name) == "ns":
         whole = clock.astype(np.int64) if clock.dtype.kind in "iu" else clock
@@ -330,7 +325,7 @@ def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[st
     for n, x in matrices.items():
         if len(x) == len(values):
             columns |= {column: x[:, k] for k, column in enumerate(of_matrix[n])}
-    check_memory(8.0 * sum(v.size for v in columns.values()), str(path))
+    check_memory(8.0 * sum(v.size for v in columns.values()))
     channels = {
         n: Channel(v.astype(float), units.get(n, "")) for n, v in columns.items() if n != name and len(v) == len(values)
     }
@@ -343,7 +338,7 @@ def log_of_variables(path: Path, variables: Mapping[str, Any], units: Mapping[st
     if other:
         notes.append(f"arrays not of the length of {name} ({len(values)}) are left out: {listed(other)}")
     plain = {k: v for k, v in header.items() if isinstance(v, int | float | str)}
-    return Log(path.name, values, channels, plain, tuple(notes))
+    return Log("", values, channels, plain, tuple(notes))
 
 
 def _time_name(vectors: Mapping[str, Any]) -> str:

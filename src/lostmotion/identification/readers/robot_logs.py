@@ -32,7 +32,6 @@ PER_CHARACTER = 10  # bytes of memory for a character of JSON
 class Recording:
     """Content of a file: (time [ns], message) by topic, encodings of the topics that are left out, and its header."""
 
-    path: Path
     topics: dict[str, list[tuple[int, Any]]] = field(default_factory=dict)
     left_out: dict[str, str] = field(default_factory=dict)
     header: dict[str, Any] = field(default_factory=dict)
@@ -44,11 +43,11 @@ class Recording:
             self.left_out[topic] = encoding or "of no stated encoding"
             return
         self.held += PER_MESSAGE + (PER_CHARACTER if encoding == "json" else 1) * len(data)
-        check_memory(self.held, str(self.path))
-        self.topics.setdefault(topic, []).append((at, _decoded(self.path, topic, decode, data)))
+        check_memory(self.held)
+        self.topics.setdefault(topic, []).append((at, _decoded(topic, decode, data)))
 
 
-def read_mcap_log(path: Path, *, time: str = "") -> Log:
+def read_mcap_log(path: Path, time: str) -> Log:
     """Read an MCAP file: the numbers of its messages are channels ``TOPIC.FIELD``, ``TOPIC.FIELD[0]`` of lists; units are SI.
 
     All are at the publish times of one topic; channels of other topics are interpolated linearly between their messages. Metadata
@@ -62,12 +61,12 @@ def read_mcap_log(path: Path, *, time: str = "") -> Log:
     if not recording.topics:
         kinds = listed(sorted(set(recording.left_out.values()))) or "no message"
         raise InputError(
-            f"has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV", where=path
+            f"has no topic in JSON or of ROS ({kinds}); record in one of these, or write its topics as CSV"
         )
-    return _log(path, recording, time)
+    return _log(recording, time)
 
 
-def read_ros_bag(path: Path, *, time: str = "") -> Log:
+def read_ros_bag(path: Path, time: str) -> Log:
     """Read a bag of ROS 1 (``.bag``) or ROS 2 (``.db3``): channels as of MCAP files, at the times of recording.
 
     Messages of ROS 2 bags without definitions are read by the definitions of Humble.
@@ -75,11 +74,11 @@ def read_ros_bag(path: Path, *, time: str = "") -> Log:
     need("rosbags", "Reading bags of ROS", "identify")
     recording = _read_bag(path)
     if not recording.topics:
-        raise InputError("has no message; record it again", where=path)
-    return _log(path, recording, time)
+        raise InputError("has no message; record it again")
+    return _log(recording, time)
 
 
-def _log(path: Path, recording: Recording, time: str) -> Log:
+def _log(recording: Recording, time: str) -> Log:
     topics = {
         topic: [rows[k] for k in sorted(range(len(rows)), key=lambda k: rows[k][0])]
         for topic, rows in recording.topics.items()
@@ -88,18 +87,18 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
     stamped = topic not in topics and topic.endswith(STAMP)
     topic = topic.removesuffix(STAMP) if stamped else topic
     if topic not in topics:
-        raise InputError(f"has no topic {topic}; its topics are {listed(topics)}", where=path)
+        raise InputError(f"has no topic {topic}; its topics are {listed(topics)}")
     instants = np.array([at for at, _ in topics[topic]], dtype=np.int64)
-    clock = _stamps(path, topic, topics[topic]) if stamped else instants
+    clock = _stamps(topic, topics[topic]) if stamped else instants
     long: set[str] = set()
     channels = {
         name: Channel(_at(instants, course, own=topic_name == topic))
         for topic_name, rows in topics.items()
-        for name, course in _courses(path, topic_name, rows, long).items()
+        for name, course in _courses(topic_name, rows, long).items()
     }
     if not channels:
-        raise InputError(f"the messages of {listed(topics)} have no number", where=path)
-    log = Log(path.name, 1e-9 * (clock - clock[0]), channels, recording.header)
+        raise InputError(f"the messages of {listed(topics)} have no number")
+    log = Log("", 1e-9 * (clock - clock[0]), channels, recording.header)
     if recording.left_out:
         kinds = ", ".join(f"{t} ({e})" for t, e in recording.left_out.items())
         log = log.noted(f"topics that are neither in JSON nor of ROS are left out: {kinds}")
@@ -114,16 +113,13 @@ def _log(path: Path, recording: Recording, time: str) -> Log:
 def _read_mcap(path: Path) -> Recording:
     from mcap import records
 
-    recording = Recording(path)
+    recording = Recording()
     decoders: dict[int, Callable[[bytes], Any] | None] = {}
     channels: dict[int, Any] = {}
     schemas: dict[int, Any] = {}
     first: dict[str, int] = {}  # log time of the first message of each topic
-    with (
-        as_refusal(path, "is not an MCAP file that mcap reads", "; if cut off, use `mcap recover`"),
-        path.open("rb") as file,
-    ):
-        for record in _mcap_records(path, file):
+    with as_refusal("is not an MCAP file that mcap reads", "; if cut off, use `mcap recover`"), path.open("rb") as file:
+        for record in _mcap_records(file):
             if isinstance(record, records.Schema):
                 schemas[record.id] = record
             elif isinstance(record, records.Channel):
@@ -134,23 +130,21 @@ def _read_mcap(path: Path) -> Recording:
                 channel = channels[record.channel_id]
                 topic = channel.topic.strip("/")
                 if channel.id not in decoders:
-                    decoders[channel.id] = _decoder(
-                        path, topic, channel.message_encoding, schemas.get(channel.schema_id)
-                    )
+                    decoders[channel.id] = _decoder(topic, channel.message_encoding, schemas.get(channel.schema_id))
                 first[topic] = min(record.log_time, first.get(topic, record.log_time))
                 recording.add(topic, record.publish_time, decoders[channel.id], record.data, channel.message_encoding)
     recording.topics = {topic: recording.topics[topic] for topic in sorted(recording.topics, key=lambda t: first[t])}
     return recording
 
 
-def _mcap_records(path: Path, file: BinaryIO) -> Iterator[Any]:
+def _mcap_records(file: BinaryIO) -> Iterator[Any]:
     """Records in the order of the file, with the records of chunks."""
     from mcap.records import Chunk
     from mcap.stream_reader import StreamReader, breakup_chunk
 
     for record in StreamReader(file, emit_chunks=True, record_size_limit=memory_limit()).records:
         if isinstance(record, Chunk):
-            check_memory(record.uncompressed_size, str(path))
+            check_memory(record.uncompressed_size)
             content = _decompressed(record.compression, record.data, record.uncompressed_size)
             if len(content) > record.uncompressed_size:
                 raise ValueError("a chunk is longer than it announces")
@@ -179,7 +173,7 @@ def _decompressed(method: str, data: bytes, size: int) -> bytes:
     return bytes(content)
 
 
-def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[bytes], Any] | None:
+def _decoder(topic: str, encoding: str, schema: Any) -> Callable[[bytes], Any] | None:
     """None of an encoding that is not read."""
     if encoding == "json":
         return json.loads
@@ -189,7 +183,7 @@ def _decoder(path: Path, topic: str, encoding: str, schema: Any) -> Callable[[by
     from rosbags.typesys import Stores, get_typestore
     from rosbags.typesys.msg import normalize_msgtype
 
-    with as_refusal(path, f"topic {topic}: the definition of {schema.name} cannot be read", "; record it again"):
+    with as_refusal(f"topic {topic}: the definition of {schema.name} cannot be read", "; record it again"):
         store = get_typestore(Stores.EMPTY)
         store.register(_types(schema.data.decode(errors="replace"), schema.name, idl=schema.encoding == "ros2idl"))
         kind = normalize_msgtype(schema.name)
@@ -253,36 +247,36 @@ def _read_bag(path: Path) -> Recording:
     from rosbags.highlevel import AnyReader
     from rosbags.typesys import Stores, get_typestore
 
-    recording = Recording(path)
+    recording = Recording()
     remedy = "; if cut off, use `rosbag reindex` or `ros2 bag reindex`"
-    with as_refusal(path, "is not a bag that rosbags reads", remedy):
+    with as_refusal("is not a bag that rosbags reads", remedy):
         if path.suffix.lower() == ".db3":
             _check_tables(path)
         with rosbag2.Reader(path) if path.suffix.lower() == ".db3" else rosbag1.Reader(path) as opened:
             for connection in opened.connections:
-                _check_definition(path, connection)
+                _check_definition(connection)
         with AnyReader([path], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
             for one in reader.readers:
                 if isinstance(one, rosbag1.Reader):
-                    one.chunks = {at: _bounded(path, chunk) for at, chunk in one.chunks.items()}
+                    one.chunks = {at: _bounded(chunk) for at, chunk in one.chunks.items()}
             for connection, at, data in reader.messages():
                 topic = connection.topic.strip("/")
                 recording.add(topic, at, partial(reader.deserialize, typ=connection.msgtype), data, "ros")
     return recording
 
 
-def _check_definition(path: Path, connection: Any) -> None:
+def _check_definition(connection: Any) -> None:
     from rosbags.interfaces import MessageDefinitionFormat
 
     kind = connection.msgdef.format
     if kind == MessageDefinitionFormat.NONE:
         return
     topic = connection.topic.strip("/")
-    with as_refusal(path, f"topic {topic}: the definition of {connection.msgtype} cannot be read", "; record it again"):
+    with as_refusal(f"topic {topic}: the definition of {connection.msgtype} cannot be read", "; record it again"):
         _types(connection.msgdef.data, connection.msgtype, idl=kind == MessageDefinitionFormat.IDL)
 
 
-def _bounded(path: Path, chunk: Any) -> Any:
+def _bounded(chunk: Any) -> Any:
     """A chunk of a bag of ROS 1 that is decompressed up to the memory limit; the library knows none."""
     from rosbags.rosbag1.reader import decompressors
 
@@ -290,7 +284,7 @@ def _bounded(path: Path, chunk: Any) -> Any:
 
     def decompress(data: bytes) -> bytes:
         content = _decompressed(method, data, memory_limit())
-        check_memory(len(content), str(path))
+        check_memory(len(content))
         return content
 
     return chunk._replace(decompressor=decompress)
@@ -308,16 +302,14 @@ def _check_tables(path: Path) -> None:
             raise ValueError(f"its database computes {name}; it must hold plain tables")
 
 
-def _decoded(path: Path, topic: str, decode: Callable[[bytes], Any], data: bytes) -> Any:
+def _decoded(topic: str, decode: Callable[[bytes], Any], data: bytes) -> Any:
     try:
         return decode(data)
     except Exception as error:  # of what the message is not
-        raise InputError(
-            f"topic {topic}: a message cannot be read ({reason(error)}); record it again", where=path
-        ) from None
+        raise InputError(f"topic {topic}: a message cannot be read ({reason(error)}); record it again") from None
 
 
-def _stamps(path: Path, topic: str, rows: list[tuple[int, Any]]) -> np.ndarray:
+def _stamps(topic: str, rows: list[tuple[int, Any]]) -> np.ndarray:
     """Times that messages carry in their header [ns]."""
     out = np.empty(len(rows), dtype=np.int64)
     for k, (_, message) in enumerate(rows):
@@ -326,8 +318,7 @@ def _stamps(path: Path, topic: str, rows: list[tuple[int, Any]]) -> np.ndarray:
         if not (isinstance(seconds, int) and isinstance(rest, int)):
             raise InputError(
                 f"topic {topic}: message {k + 1} has no header.stamp with sec and nanosec; "
-                f"give logs.time = {topic!r} for the times of its messages",
-                where=path,
+                f"give logs.time = {topic!r} for the times of its messages"
             )
         out[k] = 1_000_000_000 * seconds + rest
     return out
@@ -337,25 +328,25 @@ def _member(message: Any, name: str) -> Any:
     return message.get(name) if isinstance(message, dict) else getattr(message, name, None)
 
 
-def _courses(path: Path, topic: str, rows: list[tuple[int, Any]], long: set[str]) -> dict[str, Course]:
+def _courses(topic: str, rows: list[tuple[int, Any]], long: set[str]) -> dict[str, Course]:
     """Courses by channel, NaN in messages that lack it; names of lists that are too long go to ``long``."""
     found: dict[str, np.ndarray] = {}
     for k, (_, message) in enumerate(rows):
-        for name, value in _shallow(path, topic, message, long):
+        for name, value in _shallow(topic, message, long):
             if name not in found:
-                check_memory(16.0 * len(rows) * (len(found) + 1), f"{path}: topic {topic}: {len(found) + 1} channels")
+                check_memory(16.0 * len(rows) * (len(found) + 1), f"topic {topic}: {len(found) + 1} channels")
                 found[name] = np.full(len(rows), np.nan)
             found[name][k] = value
     at = np.array([at for at, _ in rows], dtype=np.int64)
     return {name: (at, values) for name, values in found.items()}
 
 
-def _shallow(path: Path, topic: str, message: Any, long: set[str]) -> Iterator[tuple[str, float]]:
+def _shallow(topic: str, message: Any, long: set[str]) -> Iterator[tuple[str, float]]:
     try:
         yield from _numbers(message, topic, long)
     except RecursionError:
         raise InputError(
-            f"topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other", where=path
+            f"topic {topic}: a message has more than {MOST_LEVELS} lists and objects inside of each other"
         ) from None
 
 

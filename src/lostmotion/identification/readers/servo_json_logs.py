@@ -19,7 +19,7 @@ from .log_tables import TIME_NAMES, named_columns, seconds_of
 PER_SIGN = {"{": 64, "[": 64, ":": 100, ",": 32}
 
 
-def read_servo_json(path: Path, *, time: str = "") -> Log:
+def read_servo_json(path: Path, time: str) -> Log:
     """Read a file ``{"mass": 0.5, ..., "entries": [{"timestamp": 0.0, "position": 0.1, ...}, ...]}``; units are SI.
 
     Or a file ``{"mass": 0.5, ..., "timestamps": [0.0, ...], "positions": [0.1, ...]}``, whose arrays of one length are the channels.
@@ -31,7 +31,7 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
-        check_memory(2 * sys.getsizeof(text) + sum(n * text.count(sign) for sign, n in PER_SIGN.items()), str(path))
+        check_memory(2 * sys.getsizeof(text) + sum(n * text.count(sign) for sign, n in PER_SIGN.items()))
         if path.suffix.lower() == ".jsonl":
             text = f"[{','.join(line for line in text.splitlines() if line.strip())}]"
         data, cut = _parsed(text)
@@ -39,19 +39,15 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
         data = _table(data)
     except InputError:
         raise
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
     except RecursionError:
-        raise InputError("is not a log, its lists are too deep; leave the file out", where=path) from None
+        raise InputError("is not a log, its lists are too deep; leave the file out") from None
     except ValueError as error:  # of the encoding, of JSON, or of a number of thousands of digits
-        raise InputError(
-            f"is not JSON ({reason(error)}); it may have been cut off, record or copy it again", where=path
-        ) from None
+        raise InputError(f"is not JSON ({reason(error)}); it may have been cut off, record or copy it again") from None
     notes = ["the file is cut off; it is read up to there"] if cut else []
     if isinstance(data, dict) and "entries" not in data and (arrays := _arrays(data, cut=cut)):
         columns, others = arrays, {key: value for key, value in data.items() if key not in arrays}
     else:
-        columns, others, more = _entries(path, data)
+        columns, others, more = _entries(data)
         notes += more
     names = named_columns(list(columns))
     columns, units = dict(zip((name for name, _ in names), columns.values(), strict=True)), dict(names)
@@ -59,19 +55,18 @@ def read_servo_json(path: Path, *, time: str = "") -> Log:
     header = {key.replace("-", "_"): as_number(value) for key, value in others.items()}
     step, count = header.get("dt"), len(next(iter(columns.values())))
     if clock in columns:
-        times = _numbers(path, columns[clock], clock, notes) * seconds_of(path, units[clock] or "")
+        times = _numbers(columns[clock], clock, notes) * seconds_of(units[clock] or "")
     elif not time and isinstance(step, int | float) and step > 0:
         times = float(step) * np.arange(count, dtype=float)
     else:
         raise InputError(
-            f"{'entries[0] ' if 'entries' in data else ''}lacks {clock}; add it to each entry, or the interval dt [s] to the header",
-            where=path,
+            f"{'entries[0] ' if 'entries' in data else ''}lacks {clock}; add it to each entry, or the interval dt [s] to the header"
         )
     keys = [key for key, values in columns.items() if key != clock and any(map(_is_number, values))]
     if lacking := sorted(columns.keys() - set(keys) - {clock}):
         notes.append(f"channels without numbers are left out: {', '.join(lacking)}")
-    channels = {key: Channel(_numbers(path, columns[key], key, notes), units[key] or "") for key in keys}
-    return Log(path.name, times, channels, header, tuple(notes))
+    channels = {key: Channel(_numbers(columns[key], key, notes), units[key] or "") for key in keys}
+    return Log("", times, channels, header, tuple(notes))
 
 
 def _table(data: Any) -> Any:
@@ -113,26 +108,24 @@ def _arrays(data: dict[str, Any], *, cut: bool) -> dict[str, list[Any]]:
     return {key: values for key, values in found.items() if len(values) == count}
 
 
-def _entries(path: Path, data: Any) -> tuple[dict[str, list[Any]], dict[str, Any], list[str]]:
+def _entries(data: Any) -> tuple[dict[str, list[Any]], dict[str, Any], list[str]]:
     """(values of each entry by key, header, notes)."""
     if not isinstance(data, dict) or not isinstance(data.get("entries"), list):
         raise InputError(
-            "has no list of entries; a log is a list of objects or rows, or an object with arrays of one length, one of them the time",
-            where=path,
+            "has no list of entries; a log is a list of objects or rows, or an object with arrays of one length, one of them the time"
         )
     entries = data["entries"]
     if not entries:
-        raise InputError("is empty; leave the file out", "entries", where=path)
+        raise InputError("is empty; leave the file out", "entries")
     if not all(isinstance(entry, dict) for entry in entries):
-        raise InputError("must be objects, each with a timestamp", "entries", where=path)
+        raise InputError("must be objects, each with a timestamp", "entries")
     notes, keys = [], list(entries[0])
     allowed = LOST * len(entries) if len(entries) >= LEAST else 0.0
     for key in keys:
         lacking = [k for k, entry in enumerate(entries) if key not in entry]
         if len(lacking) > allowed:
             raise InputError(
-                f"entries[{lacking[0]}] lacks {key}, which entries[0] has; remove the entry, or add the value",
-                where=path,
+                f"entries[{lacking[0]}] lacks {key}, which entries[0] has; remove the entry, or add the value"
             )
         if lacking:
             notes.append(f"{len(lacking)} entries without {key}, the first entries[{lacking[0]}]; missing there")
@@ -146,12 +139,12 @@ def _is_number(value: Any) -> bool:
     return isinstance(value, bool | int | float)
 
 
-def _numbers(path: Path, values: list[Any], key: str, notes: list[str]) -> np.ndarray:
+def _numbers(values: list[Any], key: str, notes: list[str]) -> np.ndarray:
     """Values of a channel; NaN where a value is null, and where a few are words."""
     words = [k for k, value in enumerate(values) if value is not None and not _is_number(value)]
     if len(words) > (LOST * len(values) if len(values) >= LEAST else 0.0):
         value = values[words[0]]
-        raise InputError(f"entries[{words[0]}].{key}: {value!r} is not a number; put one there, or null", where=path)
+        raise InputError(f"entries[{words[0]}].{key}: {value!r} is not a number; put one there, or null")
     if words:
         notes.append(
             f"entries[{words[0]}].{key}: {values[words[0]]!r} is not a number; its sample is missing there ({len(words)} in all)"

@@ -28,7 +28,7 @@ MOST_ROWS, MOST_COLUMNS = 1_048_576, 16_384  # by the format
 STYLES = "xl/styles.xml"
 
 
-def read_xlsx_log(path: Path, *, time: str = "") -> Log:
+def read_xlsx_log(path: Path, time: str) -> Log:
     """Read the first sheet of a workbook with values: a heading, in the first column ``# key: value`` above it as the header.
 
     Formulas count by the values that are saved with them. Times are numbers, time stamps, or cells with a date.
@@ -36,18 +36,18 @@ def read_xlsx_log(path: Path, *, time: str = "") -> Log:
     need("openpyxl", "Reading XLSX files", "identify")
     import openpyxl
 
-    with as_refusal(path, "is not an XLSX file", "; save it as .xlsx again, or as CSV"):
+    with as_refusal("is not an XLSX file", "; save it as .xlsx again, or as CSV"):
         with zipfile.ZipFile(path) as archive:
-            _check(path, archive)
+            _check(archive)
         with warnings.catch_warnings(), path.open("rb") as file:
             warnings.simplefilter("ignore")  # of extensions, validations and headers of pages, which are not read
             book = openpyxl.load_workbook(file, read_only=True, data_only=True, keep_links=False)
-            log = _of_book(path, book, time)
+            log = _of_book(book, time)
             book.close()
     return log
 
 
-def _of_book(path: Path, book: Any, clock: str) -> Log:
+def _of_book(book: Any, clock: str) -> Log:
     """The log of the first sheet with something in it."""
     for sheet in book.worksheets:
         sheet.reset_dimensions()  # what a file announces need not be so
@@ -57,22 +57,22 @@ def _of_book(path: Path, book: Any, clock: str) -> Log:
         if first is None:
             continue
         try:
-            log = _table(path, [*_chained(first, rows)], comments, clock)
+            log = _table([*_chained(first, rows)], comments, clock)
         except UnreadError as problem:
-            raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}", where=path) from None
+            raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}") from None
         others = [s.title for s in book.worksheets if s is not sheet]
         note = f"sheet {sheet.title} is read; left out are {listed(others)}"
         return log.noted(note) if others else log
-    raise InputError("has no sheet with values; save the log in the first sheet", where=path)
+    raise InputError("has no sheet with values; save the log in the first sheet")
 
 
-def _table(path: Path, rows: list[TableRow], comments: list[str], time: str) -> Log:
+def _table(rows: list[TableRow], comments: list[str], time: str) -> Log:
     """The log of a sheet, without the lines and cells that cannot be read."""
     try:
-        return table_log(path, iter(rows), _number, comments, time)
+        return table_log(iter(rows), _number, comments, time)
     except UnreadError as problem:
         try:
-            return odd_table_log(path, rows, _number, comments, time)[1]
+            return odd_table_log(rows, _number, comments, time)[1]
         except UnreadError:
             raise problem from None
 
@@ -116,25 +116,25 @@ def _number(cell: Any) -> float | None:
 # --- checks ---
 
 
-def _check(path: Path, archive: zipfile.ZipFile) -> None:
+def _check(archive: zipfile.ZipFile) -> None:
     """Refuse a workbook that needs more memory than the limit, defines entities, or has formulas without values."""
     needed = 0.0
-    for name, about in members(path, archive).items():
-        part = _Part(path, name)
+    for name, about in members(archive).items():
+        part = _Part(name)
         with archive.open(name) as stream:
             part.count(stream)
         each = PER_TEXT if part.root == "sst" and name != STYLES else PER_ELEMENT
         needed += (
             2.0 * about.file_size + each * part.outside + PER_ROW * (part.rows + part.largest) + PER_CELL * part.cells
         )
-        check_memory(needed, str(path))
+        check_memory(needed)
 
 
 class _Part:
     """Content of a part of a workbook, by a parser that stores nothing."""
 
-    def __init__(self, path: Path, name: str) -> None:
-        self.path, self.name = path, name
+    def __init__(self, name: str) -> None:
+        self.name = name
         self.root = ""
         self.rows, self.cells = 0, 0
         self.outside = 0  # elements that are in no row
@@ -156,7 +156,7 @@ class _Part:
             parser.Parse(b"", True)
 
     def _refuse(self, *_: Any) -> None:
-        raise InputError(f"{self.name}: defines entities, which no workbook does; save it again", where=self.path)
+        raise InputError(f"{self.name}: defines entities, which no workbook does; save it again")
 
     def _begin(self, tag: str, attributes: dict[str, str]) -> None:
         tag = tag.rpartition(" ")[2]
@@ -167,9 +167,7 @@ class _Part:
             self._in_row, self._column, self._size = True, 0, 0
             row = int(float(attributes.get("r", self._row + 1)))
             if not self._row < row <= MOST_ROWS:
-                raise InputError(
-                    f"{self.name}: row {row} comes after row {self._row}; save the file again", where=self.path
-                )
+                raise InputError(f"{self.name}: row {row} comes after row {self._row}; save the file again")
             self._row = row
         elif not self._in_row:
             self.outside += 1
@@ -178,9 +176,7 @@ class _Part:
             self._column = _column(letters) if letters else self._column + 1
             self.cells += 1
             if self._column > MOST_COLUMNS:
-                raise InputError(
-                    f"{self.name}: row {self._row} has a cell {letters}; save the file again", where=self.path
-                )
+                raise InputError(f"{self.name}: row {self._row} has a cell {letters}; save the file again")
             self._formula, self._value = False, attributes.get("t") == "str"
         self._formula = self._formula or tag == "f"
         self._in_value = tag == "v"
@@ -197,8 +193,7 @@ class _Part:
         elif tag == "c" and self._in_row and self._formula and not self._value:
             raise InputError(
                 f"{self.name}: row {self._row} has a formula without its value; open the file in a spreadsheet "
-                "program, and save it",
-                where=self.path,
+                "program, and save it"
             )
         self._in_value = False
 

@@ -51,7 +51,7 @@ class Reading:
         return float(cell.replace(",", "."))
 
 
-def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
+def read_text_log(path: Path, time: str, decimal: str) -> Log:
     """Read a table with one heading: ``time [s], position [deg]``, with ``# key: value`` or ``# key = value`` above it as the header.
 
     A comment ``# unit position: deg``, or a line of units below the heading, gives the unit of a column. A number in brackets,
@@ -64,12 +64,10 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
     """
     try:
         text = path.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise InputError(f"cannot be read: {error.strerror}", where=path) from None
     except UnicodeDecodeError as error:
-        raise InputError(f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8", where=path) from None
+        raise InputError(f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from None
     cells = max(map(text.count, ",;\t ")) + text.count("\n") + 1
-    check_memory(2 * sys.getsizeof(text) + PER_CELL * cells, str(path))
+    check_memory(2 * sys.getsizeof(text) + PER_CELL * cells)
     problems: list[UnreadError] = []
     ways = [
         Reading(separator, sign) for sign, separator in itertools.product(decimal or ".,", ";\t, ") if sign != separator
@@ -77,29 +75,29 @@ def read_text_log(path: Path, *, time: str = "", decimal: str = "") -> Log:
     for reading in ways:
         comments: list[str] = []
         try:
-            log = table_log(path, _rows(text, comments, reading), reading.number, comments, time)
+            log = table_log(_rows(text, comments, reading), reading.number, comments, time)
         except UnreadError as problem:
             problems.append(problem)
             continue
-        return log if decimal else _announced(path, log, reading)
+        return log if decimal else _announced(log, reading)
     found: list[tuple[int, Log, Reading]] = []
     for reading in ways:
         comments = []
         with suppress(UnreadError):
             rows = list(_rows(text, comments, reading))
-            lost, log = odd_table_log(path, rows, reading.number, comments, time)
+            lost, log = odd_table_log(rows, reading.number, comments, time)
             cell = reading.first[1]
             if cell:
                 reading.first = next((n, cell) for n, cells in rows if cell in (c.strip() for c in cells))
             found.append((lost, log, reading))
     if found:
         _, log, reading = min(found, key=lambda way: way[0])
-        return log if decimal else _announced(path, log, reading)
+        return log if decimal else _announced(log, reading)
     worst = max(problems, key=lambda problem: problem.row)
-    raise InputError(f"{f'line {worst.row}: ' if worst.row else ''}{worst}", where=path)
+    raise InputError(f"{f'line {worst.row}: ' if worst.row else ''}{worst}")
 
 
-def _announced(path: Path, log: Log, reading: Reading) -> Log:
+def _announced(log: Log, reading: Reading) -> Log:
     """A log with a note on its decimal commas, if they can be nothing else."""
     line, cell = reading.first
     if not line:
@@ -107,8 +105,7 @@ def _announced(path: Path, log: Log, reading: Reading) -> Log:
     if not reading.sure:
         raise InputError(
             f"line {line}: {cell!r} may have a decimal comma, or one between thousands; "
-            'give logs.decimal = ",", or write it without commas between thousands',
-            where=path,
+            'give logs.decimal = ",", or write it without commas between thousands'
         )
     note = f'its commas are read as decimal commas, such as {cell!r} in line {line}; logs.decimal = "," says so'
     return replace(log, notes=(note, *log.notes))

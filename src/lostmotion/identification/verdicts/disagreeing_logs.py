@@ -86,7 +86,7 @@ UNEXPLAINED = "no sign, unit, delay, clock, wrap, frozen or slow channel explain
 
 
 def odd_logs(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], start: ParameterPoint, fit: Fit, rung: int
+    engine: Engine, logs: Sequence[Prepared], start: ParameterPoint, fit: Fit, rung: int
 ) -> tuple[list[OddLog], ParameterPoint]:
     """Logs that disagree with the others, those fitted and those held out, and the point that fits the others.
 
@@ -97,11 +97,11 @@ def odd_logs(
     Returns list of OddLog: empty if all logs agree, or if fewer than three were fitted.
     Returns Point
     """
-    train = [log for log in logs if not log.held_out]
+    rig, train = engine.rig, [log for log in logs if not log.held_out]
     if len(train) < FEWEST:
         return [], fit.point
-    agreeing, point = _agreeing(rig, engine, train, start, fit, rung)
-    sizes = _Sizes(rig, engine, agreeing, point, rung)
+    agreeing, point = _agreeing(engine, train, start, fit, rung)
+    sizes = _Sizes(engine, agreeing, point, rung)
     found = []
     seen = sizes.of_each(logs)
     worst = sorted((ratio for _, ratio in seen), reverse=True)[:SEARCHED]
@@ -121,9 +121,9 @@ def odd_logs(
 class _Sizes:
     """Residuals of logs at a point, relative to the residuals of logs that agree."""
 
-    def __init__(self, rig: Rig, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> None:
-        self.rig, self.engine, self.point, self.rung = rig, engine, point, rung
-        problem = problem_of(rig, engine, logs, rung)
+    def __init__(self, engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> None:
+        self.engine, self.point, self.rung = engine, point, rung
+        problem = problem_of(engine, logs, rung)
         floor = problem.resolution / math.sqrt(12.0)
         if problem.given is not None:
             floor = np.maximum(floor, problem.given)
@@ -148,10 +148,10 @@ class _Sizes:
     def all_of(self, logs: Sequence[Prepared]) -> np.ndarray:
         """Residuals of logs [SI], one row for each log, each with nuisances of its own."""
         point = self.point
-        if self.rig.task.nuisance:
+        if self.engine.rig.task.nuisance:
             residuals = self.engine.residuals(logs, point, self.rung)
             able = [log for log in logs if log.name not in self.engine.failed]  # without a run the residuals are NaN
-            own = replace(problem_of(self.rig, self.engine, able, self.rung), parameters={})
+            own = replace(problem_of(self.engine, able, self.rung), parameters={})
             if own.given is None:  # the size of most logs, so that one that is far off does not weaken the others
                 rows = np.array([_rms(log, r) for log, r in zip(logs, residuals, strict=True)])
                 own = replace(own, given=np.maximum(np.nanmedian(rows, axis=0), 1e-12))
@@ -177,51 +177,49 @@ def _spread(log: Prepared) -> np.ndarray:
 
 
 def _agreeing(
-    rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
+    engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
 ) -> tuple[list[Prepared], ParameterPoint]:
     """(logs that agree with each other, the point that fits them)."""
     point, kept = fit.point, train
     most = max(1, len(train) // SHARE)
     for _ in range(ROUNDS):
-        sizes = _Sizes(rig, engine, kept, point, rung)
+        sizes = _Sizes(engine, kept, point, rung)
         ratios = [ratio for _, ratio in sizes.of_each(train)]
         worst = sorted(range(len(train)), key=lambda k: -ratios[k])[:most]
         aside = {k for k in worst if ratios[k] > SUSPECT}
         if not aside and len(kept) == len(train):
-            return _leave_one_out(rig, engine, train, start, fit, rung)
+            return _leave_one_out(engine, train, start, fit, rung)
         rest = [log for k, log in enumerate(train) if k not in aside]
         if rest == kept:
             break
-        kept, point = rest, _fitted(rig, engine, rest, [start, point], rung)
+        kept, point = rest, _fitted(engine, rest, [start, point], rung)
     return kept, point
 
 
 def _leave_one_out(
-    rig: Rig, engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
+    engine: Engine, train: list[Prepared], start: ParameterPoint, fit: Fit, rung: int
 ) -> tuple[list[Prepared], ParameterPoint]:
     """The same for few logs: one of them may have spoiled the fit so that it does not stand out."""
-    problem = problem_of(rig, engine, train, rung)
+    problem = problem_of(engine, train, rung)
     if len(train) > FEW or explained(problem, engine.residuals(train, fit.point, rung)):
         return train, fit.point
     best: tuple[float, list[Prepared], ParameterPoint] = (SUSPECT, train, fit.point)
     for k, log in enumerate(train):
         rest = [*train[:k], *train[k + 1 :]]
-        point = _fitted(rig, engine, rest, [start], rung)
-        ratio = _Sizes(rig, engine, rest, point, rung).of(log)[1]
+        point = _fitted(engine, rest, [start], rung)
+        ratio = _Sizes(engine, rest, point, rung).of(log)[1]
         if ratio > best[0]:
             best = (ratio, rest, point)
     return best[1:]
 
 
-def _fitted(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], starts: Sequence[ParameterPoint], rung: int
-) -> ParameterPoint:
+def _fitted(engine: Engine, logs: Sequence[Prepared], starts: Sequence[ParameterPoint], rung: int) -> ParameterPoint:
     """The best point of searches from some starts; the last start if none of them has a run."""
-    problem = problem_of(rig, engine, logs, rung)
+    problem = problem_of(engine, logs, rung)
     best, least = starts[-1], math.inf
     for start in starts:
         try:
-            fit = search(problem, start, iterations=rig.task.fit.iterations)
+            fit = search(problem, start)
         except InputError:
             continue
         size = float(np.nanmedian([np.mean(np.abs(r)) for r in engine.residuals(logs, fit.point, rung)]))
@@ -242,7 +240,8 @@ def _explained(rig: Rig, log: Prepared, sizes: _Sizes, *, search_times: bool) ->
     before = sizes.of(log)[1]
     runs = _runs(rig, log, sizes)
     other = list(_faults(rig, log, sizes, runs))
-    tried = [*other, *_late_channels(rig, log, runs)]  # late inputs may explain the latter better
+    late_channels = (one for channel, run in runs.items() for one in _late(rig, log, channel, run))
+    tried = [*other, *late_channels]  # late inputs may explain the latter better
     if not tried:
         return nothing
     ratios = sizes.several([mended for _, mended in tried])
@@ -335,14 +334,8 @@ def _displaced(rig: Rig, log: Prepared, channel: str, run: np.ndarray) -> Iterat
         yield f"{channel} jumps by {period:.6g}, as a counter that wraps", log.changed(rig.task, {channel: whole})
 
 
-def _late_channels(rig: Rig, log: Prepared, runs: Mapping[str, np.ndarray]) -> Iterator[tuple[str, Prepared]]:
-    """Each measured channel late or early, and all of them by as much."""
-    for channel, run in runs.items():
-        yield from _late(rig, log, channel, run)
-
-
 def _late(rig: Rig, log: Prepared, channel: str, run: np.ndarray) -> Iterator[tuple[str, Prepared]]:
-    """A measured channel late or early, by the time with the smallest residuals."""
+    """A measured channel late or early, and all of them by as much, by the time with the smallest residuals."""
     step, x = log.log.interval, log.log.values(channel)
     most = min(SHIFTS, len(x) // 4)
 

@@ -83,7 +83,7 @@ def family(fault: str) -> str:
 
 
 def shared_faults(
-    rig: Rig, engine: Engine, logs: Sequence[Prepared], odd: Sequence[OddLog], point: ParameterPoint, rung: int
+    engine: Engine, logs: Sequence[Prepared], odd: Sequence[OddLog], point: ParameterPoint, rung: int
 ) -> list[SharedFault]:
     """Faults of the model's kind that several logs share.
 
@@ -95,7 +95,7 @@ def shared_faults(
     for o in odd:
         if name := family(o.fault):
             of_family.setdefault(name, []).append(o)
-    facts = {log.name: _facts(rig, log) for log in logs}
+    facts = {log.name: _facts(engine.rig, log) for log in logs}
     for members in of_family.values():
         names = tuple(o.log for o in members)
         if len(names) < FEW:
@@ -105,7 +105,7 @@ def shared_faults(
             continue
         own = [log for log in logs if log.name in names]
         rest = [log for log in logs if log.name not in names]
-        candidate = _candidate(rig, engine, own, rest, point, rung)
+        candidate = _candidate(engine, own, rest, point, rung)
         common = common if score >= KIND else _kinds_of(facts, set(names))
         found.append(SharedFault(names, len(logs), _ranged(members), common, candidate))
     return found
@@ -210,12 +210,12 @@ def _is(key: str, value: Any) -> Test:
     return lambda f: bool(f.get(key) == value)
 
 
-def _within(key: str, low: float, high: float) -> Test:
-    return lambda f: isinstance(f.get(key), int | float) and low <= f[key] <= high
-
-
 def _both(a: Test, b: Test) -> Test:
     return lambda f: a(f) and b(f)
+
+
+def _within(key: str, low: float, high: float) -> Test:
+    return lambda f: isinstance(f.get(key), int | float) and low <= f[key] <= high
 
 
 def _scored(facts: dict[str, dict[str, Any]], names: set[str], words: str, test: Test) -> tuple[str, Test, float]:
@@ -243,33 +243,25 @@ def _is_number(word: str) -> bool:
 
 
 def _candidate(
-    rig: Rig, engine: Engine, own: Sequence[Prepared], rest: Sequence[Prepared], point: ParameterPoint, rung: int
+    engine: Engine, own: Sequence[Prepared], rest: Sequence[Prepared], point: ParameterPoint, rung: int
 ) -> str:
     """Limit of the rate, or filter, of an input that makes the residuals of some logs far smaller and no others larger."""
-    some, others = [_fresh(log) for log in own[:TRIED]], [_fresh(log) for log in rest[:TRIED]]
+    rig, some, others = engine.rig, own[:TRIED], rest[:TRIED]
     best: tuple[float, str] = (BETTER, "")
     before, before_others = (_size(engine, x, point, rung) for x in (some, others))
     if not before > 0.0:
         return ""
     for name, key, values in _grids(rig, some):
-        tried: list[tuple[float, float]] = []
-        for value in values:
-            tried.append(_tried(rig, engine, some, point, rung, name, key, value))
-        near = min(tried)[1]
-        for value in near * np.geomspace(0.7, 1.4, 7):
-            tried.append(_tried(rig, engine, some, point, rung, name, key, float(value)))
-        size, value = min(tried)
-        if size / before < best[0]:
-            other = Engine(_with(rig, name, key, value), engine.threads)
-            if _size(other, [_fresh(log) for log in others], point, rung) <= 1.5 * before_others or not others:
-                unit = (
-                    ""
-                    if key == "filter_time"
-                    else f" {rig.units.get(name, '')}/s".replace("rad/s/s", "rad/s^2").rstrip()
-                )
-                amount = f"{value:.3g} s" if key == "filter_time" else f"{value:.3g}{unit}"
-                words = f"inputs.{name}.{key} near {amount}, with which their residuals are {size / before:.2g} of what they are"
-                best = size / before, words
+
+        def size_with(value: float, logs: Sequence[Prepared], name: str = name, key: str = key) -> float:
+            return _size(Engine(_with(rig, name, key, value), engine.threads), logs, point, rung)
+
+        near = min(values, key=lambda value: size_with(value, some))
+        size, value = min((size_with(x, some), x) for x in (near, *(near * np.geomspace(0.7, 1.4, 7)).tolist()))
+        if size / before < best[0] and (not others or size_with(value, others) <= 1.5 * before_others):
+            unit = "s" if key == "filter_time" else f"{rig.units.get(name, '')}/s".replace("rad/s/s", "rad/s^2")
+            words = f"inputs.{name}.{key} near {value:.3g} {unit}, with which their residuals are {size / before:.2g} of what they are"
+            best = size / before, words
     return best[1]
 
 
@@ -293,28 +285,11 @@ def _with(rig: Rig, name: str, key: str, value: float) -> Rig:
     return other
 
 
-def _tried(
-    rig: Rig,
-    engine: Engine,
-    logs: Sequence[Prepared],
-    point: ParameterPoint,
-    rung: int,
-    name: str,
-    key: str,
-    value: float,
-) -> tuple[float, float]:
-    other = Engine(_with(rig, name, key, value), engine.threads)
-    return _size(other, [_fresh(log) for log in logs], point, rung), value
-
-
-def _fresh(log: Prepared) -> Prepared:
-    return replace(log, cache={})
-
-
 def _size(engine: Engine, logs: Sequence[Prepared], point: ParameterPoint, rung: int) -> float:
     """Median of the root mean squares of logs."""
     if not logs:
         return 0.0
+    logs = [replace(log, cache={}) for log in logs]
     sizes = [
         math.sqrt(float(np.mean((r / log.weight) ** 2)))
         for log, r in zip(logs, engine.residuals(logs, point, rung), strict=True)

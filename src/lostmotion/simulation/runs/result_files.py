@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...atomic_writer import write_whole
-from ...errors import InputError, need
+from ...errors import InputError, need, prefixed
 from ...inputs.arguments import checked
 from ...inputs.hdf5_files import datasets
 from ...inputs.limits import RESULT, check_memory, read_text
@@ -163,8 +163,8 @@ def _read_netcdf(path: Path) -> xarray.Dataset:
     import h5py
     import xarray as xr
 
-    with h5py.File(path, "r") as raw:
-        datasets(path, raw, RESULT, depth=1)
+    with prefixed(path), h5py.File(path, "r") as raw:
+        datasets(raw, RESULT, depth=1)
     with xr.open_dataset(path, engine="h5netcdf") as opened:
         result = opened.load()
     with h5netcdf.File(path) as file:
