@@ -12,6 +12,25 @@ if TYPE_CHECKING:
     from ..simulation.scenario.scenario import Scenario
 
 
+def option(
+    metavar: str, about: str, *names: str, default: Any = None, parser: Callable[[str], Any] | None = None
+) -> Any:
+    """An option of a command with a value; without names it is called as its parameter."""
+    return typer.Option(default, *names, metavar=metavar, help=about, parser=parser)
+
+
+def flag(about: str, *names: str, default: bool = False) -> Any:
+    """An option of a command without a value; without names there is one for yes and one for no."""
+    return typer.Option(default, *names, help=about)
+
+
+def argument(
+    metavar: str, about: str, default: Any = None, autocompletion: Callable[[str], list[str]] | None = None
+) -> Any:
+    """An argument of a command; `...` as the default: it is required."""
+    return typer.Argument(default, metavar=metavar, help=about, autocompletion=autocompletion)
+
+
 def number(unit: str = "", option: str = "") -> Callable[[str], float]:
     """Reads the value of an option: a bare number in `unit`, which is printed back, or one with a unit, as in a scenario."""
 

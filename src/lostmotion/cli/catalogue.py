@@ -3,37 +3,24 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
+from .arguments import argument, flag, option
 
 
 def catalogue(
-    name: Annotated[
-        str | None, typer.Argument(metavar="[NAME | new]", help="Show one record; `new`: a template for your own.")
-    ] = None,
-    kind: Annotated[
-        str | None,
-        typer.Option(
-            "--kind",
-            metavar="KIND",
-            help="gearbox, motor, screw, rack, belt, linear_motor, actuator, brake, amplifier, or a kind of one: planetary, ironless, ...",
-        ),
-    ] = None,
-    ratio: Annotated[str | None, typer.Option("--ratio", metavar="MIN..MAX", help="Gear ratio.")] = None,
-    torque: Annotated[str | None, typer.Option("--torque", metavar="MIN..MAX", help="Rated torque [N·m].")] = None,
-    force: Annotated[
-        str | None, typer.Option("--force", metavar="MIN..MAX", help="Rated force [N]; of screws the dynamic capacity.")
-    ] = None,
-    lead: Annotated[
-        str | None, typer.Option("--lead", metavar="MIN..MAX", help='Lead of a screw [m], e.g. "5 mm..10 mm".')
-    ] = None,
-    current: Annotated[
-        str | None, typer.Option("--current", metavar="MIN..MAX", help="Continuous current of an amplifier [A rms].")
-    ] = None,
-    complete: Annotated[bool, typer.Option("--complete", help="Only records that can be simulated.")] = False,
-    every: Annotated[bool, typer.Option("--all", help="List all that fit, not only a screen of them.")] = False,
-    output: Annotated[Path | None, typer.Option("-o", "--output", metavar="FILE", help="With `new`: the file.")] = None,
+    name: str | None = argument("[NAME | new]", "Show one record; `new`: a template for your own."),
+    kind: str | None = option(
+        "KIND",
+        "gearbox, motor, screw, rack, belt, linear_motor, actuator, brake, amplifier, or a kind of one: planetary, ironless, ...",
+    ),
+    ratio: str | None = option("MIN..MAX", "Gear ratio."),
+    torque: str | None = option("MIN..MAX", "Rated torque [N·m]."),
+    force: str | None = option("MIN..MAX", "Rated force [N]; of screws the dynamic capacity."),
+    lead: str | None = option("MIN..MAX", 'Lead of a screw [m], e.g. "5 mm..10 mm".'),
+    current: str | None = option("MIN..MAX", "Continuous current of an amplifier [A rms]."),
+    complete: bool = flag("Only records that can be simulated.", "--complete"),
+    every: bool = flag("List all that fit, not only a screen of them.", "--all"),
+    output: Path | None = option("FILE", "With `new`: the file.", "-o", "--output"),
 ) -> None:
     """To find a gearbox, motor or screw, or to write your data sheet.
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from .arguments import Overrides, SourceArgument, again, load_scenario
+from .arguments import Overrides, SourceArgument, again, load_scenario, option
 from .targets import try_page
 from .terminal import about, conclude, simulating
 
@@ -15,9 +12,7 @@ from .terminal import about, conclude, simulating
 def check(
     scenario: SourceArgument,
     overrides: Overrides = None,
-    report: Annotated[
-        Path | None, typer.Option("-o", "--report", metavar="FILE", help="Also write the findings as a page: .html.")
-    ] = None,
+    report: Path | None = option("FILE", "Also write the findings as a page: .html.", "-o", "--report"),
 ) -> None:
     """To see whether a drive fits its task: torques, speeds, heat.
 

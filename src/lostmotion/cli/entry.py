@@ -7,7 +7,7 @@ import os
 import re
 import sys
 import warnings
-from typing import Annotated, Any, NoReturn
+from typing import Any, NoReturn
 
 import typer
 
@@ -127,18 +127,15 @@ def _limit_memory(text: str | None) -> None:
 
 @app.callback()
 def common(
-    version: Annotated[
-        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Print the version and exit.")
-    ] = False,
-    memory: Annotated[
-        str | None,
-        typer.Option(
-            "--memory",
-            metavar="SIZE",
-            callback=_limit_memory,
-            help='Memory that one input file may need, such as "2 GB" (512 MiB; a saved result 4 GiB).',
-        ),
-    ] = None,
+    version: bool = typer.Option(
+        False, "--version", callback=_print_version, is_eager=True, help="Print the version and exit."
+    ),
+    memory: str | None = typer.Option(
+        None,
+        metavar="SIZE",
+        callback=_limit_memory,
+        help='Memory that one input file may need, such as "2 GB" (512 MiB; a saved result 4 GiB).',
+    ),
 ) -> None:
     """Dynamics of geared servo drives: lost motion, sticking and load-dependent losses, solved exactly."""
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from .arguments import Overrides, SourceArgument, load_scenario
+from .arguments import Overrides, SourceArgument, flag, load_scenario, option
 from .targets import try_file
 from .terminal import about, busy
 
@@ -16,41 +13,21 @@ SYSTEMS = {"linux": "Linux", "windows": "Windows", "darwin": "macOS"}
 
 def fmu(
     scenario: SourceArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.fmu", help="The FMU.")],
+    output: Path = option("FILE.fmu", "The FMU.", "-o", "--output", default=...),
     overrides: Overrides = None,
-    controllers: Annotated[
-        bool,
-        typer.Option(
-            "--controllers/--no-controllers",
-            help="With the controllers of the scenario inside, or motors turned by commands.",
-        ),
-    ] = True,
-    fmi: Annotated[int, typer.Option("--fmi", metavar="2|3", help="Version of the standard: 2.0 or 3.0.")] = 2,
-    references: Annotated[
-        bool,
-        typer.Option(
-            "--reference-inputs",
-            help="The references of sampled controllers are inputs, which replace those of the scenario.",
-        ),
-    ] = False,
-    source: Annotated[
-        bool,
-        typer.Option("--source", help="With the C++ sources too, for tools and targets that compile FMUs themselves."),
-    ] = False,
-    motion_inputs: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--motion-inputs",
-            metavar="SHAFT",
-            help="A shaft or slide whose position, speed and acceleration are inputs; its torque or force is an output. May be repeated.",
-        ),
-    ] = None,
-    libraries: Annotated[
-        Path | None,
-        typer.Option(
-            "--libraries", metavar="DIRECTORY", help="Libraries of the platforms, if others than the installed ones."
-        ),
-    ] = None,
+    controllers: bool = flag(
+        "With the controllers of the scenario inside, or motors turned by commands.", default=True
+    ),
+    fmi: int = option("2|3", "Version of the standard: 2.0 or 3.0.", default=2),
+    references: bool = flag(
+        "The references of sampled controllers are inputs, which replace those of the scenario.", "--reference-inputs"
+    ),
+    source: bool = flag("With the C++ sources too, for tools and targets that compile FMUs themselves.", "--source"),
+    motion_inputs: list[str] | None = option(
+        "SHAFT",
+        "A shaft or slide whose position, speed and acceleration are inputs; its torque or force is an output. May be repeated.",
+    ),
+    libraries: Path | None = option("DIRECTORY", "Libraries of the platforms, if others than the installed ones."),
 ) -> None:
     """To use a drive in Simulink and other tools: write an FMU.
 

@@ -6,11 +6,11 @@ import math
 import os
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from .arguments import FiguresOption
+from .arguments import FiguresOption, argument, flag, option
 from .targets import pictures_of, writing
 from .terminal import busy, fail
 
@@ -22,33 +22,19 @@ PROGRESS = "identify-progress.json"
 
 
 def identify(
-    file: Annotated[
-        Path,
-        typer.Argument(
-            metavar="IDENTIFY.toml|new", help="Identification file: logs, rig, parameters; `new`: a first one for logs."
-        ),
-    ],
-    directory: Annotated[
-        Path | None, typer.Argument(metavar="[DIR]", help="With `new`: the directory that holds the logs.")
-    ] = None,
-    output: Annotated[
-        Path | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="PATH",
-            help="Directory of the results, made if missing; else none is written. With `new` the file (DIR/identify.toml).",
-        ),
-    ] = None,
-    rig: Annotated[
-        str | None, typer.Option("--rig", metavar="RIG.toml", help="With `new`: scenario whose variables are taken.")
-    ] = None,
-    profiles: Annotated[
-        bool, typer.Option("--profiles", help="Also intervals by the profile of the likelihood (takes longer).")
-    ] = False,
-    all_logs: Annotated[
-        bool, typer.Option("--all-logs", help="Draw all logs; else of many logs the worst, median and best.")
-    ] = False,
+    file: Path = argument(
+        "IDENTIFY.toml|new", "Identification file: logs, rig, parameters; `new`: a first one for logs.", default=...
+    ),
+    directory: Path | None = argument("[DIR]", "With `new`: the directory that holds the logs."),
+    output: Path | None = option(
+        "PATH",
+        "Directory of the results, made if missing; else none is written. With `new` the file (DIR/identify.toml).",
+        "-o",
+        "--output",
+    ),
+    rig: str | None = option("RIG.toml", "With `new`: scenario whose variables are taken."),
+    profiles: bool = flag("Also intervals by the profile of the likelihood (takes longer).", "--profiles"),
+    all_logs: bool = flag("Draw all logs; else of many logs the worst, median and best.", "--all-logs"),
     figures: FiguresOption = None,
 ) -> None:
     """To get the parameters of a real drive from measured logs.
@@ -70,9 +56,9 @@ def identify(
     if str(file) == "new":
         _new(directory, rig, output)
         return
-    for option, value in (("DIR", directory), ("--rig", rig)):
+    for what, value in (("DIR", directory), ("--rig", rig)):
         if value is not None:
-            raise typer.BadParameter(f"{option} goes with `identify new`")
+            raise typer.BadParameter(f"{what} goes with `identify new`")
     pictures = pictures_of(figures, output)
     from ..identification.identify import identify as run
 

@@ -3,22 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from .arguments import Overrides, SourceArgument, again, load_scenario
+from .arguments import Overrides, SourceArgument, again, flag, load_scenario, option
 from .targets import try_file
 from .terminal import about, busy
 
 
 def live(
     scenario: SourceArgument,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="HTML file; left out, NAME.html.")
-    ] = None,
+    output: Path | None = option("FILE", "HTML file; left out, NAME.html.", "-o", "--output"),
     overrides: Overrides = None,
-    show: Annotated[bool, typer.Option("--open/--no-open", help="Open the page in the browser.")] = True,
+    show: bool = flag("Open the page in the browser.", "--open/--no-open", default=True),
 ) -> None:
     """To try values by sliders: write a page that solves the drive.
 

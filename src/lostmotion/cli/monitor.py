@@ -3,23 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
 import typer
 
-from .arguments import FiguresOption, ReportOption
+from .arguments import FiguresOption, ReportOption, argument
 from .targets import pictures_of, writing
 from .terminal import busy
 
 
 def monitor(
-    file: Annotated[
-        Path, typer.Argument(metavar="TASK.toml", help="Identification file; its table [monitor] says what is watched.")
-    ],
-    logs: Annotated[
-        list[Path] | None,
-        typer.Argument(metavar="[LOGS]...", help="Log files or directories; default: the logs of the file."),
-    ] = None,
+    file: Path = argument("TASK.toml", "Identification file; its table [monitor] says what is watched.", default=...),
+    logs: list[Path] | None = argument("[LOGS]...", "Log files or directories; default: the logs of the file."),
     output: ReportOption = None,
     figures: FiguresOption = None,
 ) -> None:

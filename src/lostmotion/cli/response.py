@@ -4,11 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, again, load_scenario, number
+from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, again, load_scenario, number, option
 from .targets import pictures_of, writing
 from .terminal import about, announce_response, busy, progress
 
@@ -18,44 +16,26 @@ if TYPE_CHECKING:
 
 def response(
     scenario: SourceArgument,
-    amplitudes: Annotated[
-        str,
-        typer.Option(
-            "--amplitudes",
-            metavar="LIST",
-            help="0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many). Commas separate; two whole numbers, which may be "
-            "a decimal comma, are written 1.0,5.0.",
-        ),
-    ] = "0.02..1:6",
-    frequencies: Annotated[
-        str, typer.Option("--frequencies", metavar="LIST", help="[Hz], written as the amplitudes.")
-    ] = "0.1..100:60",
-    source: Annotated[
-        str | None,
-        typer.Option(
-            "--input",
-            metavar="NAME",
-            help="Input that is a sine: command, reference (with a controller) or load_torque; in a train <motor>_command, <motor>_reference, "
-            "<shaft>_load_torque ... Default: command or reference of the only motor.",
-        ),
-    ] = None,
-    variable: Annotated[
-        str | None,
-        typer.Option(
-            "--variable",
-            metavar="NAME",
-            help="Variable of the response. Default: load_speed, in a train the speed of its last shaft, with a controller the measured "
-            "value of its outermost loop.",
-        ),
-    ] = None,
-    refine: Annotated[
-        float | None,
-        typer.Option("--refine", metavar="DB", parser=number(), help="Add frequencies where a curve bends by more."),
-    ] = None,
-    compare: Annotated[
-        list[str] | None,
-        typer.Option("--compare", metavar="OTHER", help="Overlay the drive or train of another scenario."),
-    ] = None,
+    amplitudes: str = option(
+        "LIST",
+        "0.025,0.1,1 or, with equal ratios, 0.01..1:8 (first, last, how many). Commas separate; two whole numbers, which may be "
+        "a decimal comma, are written 1.0,5.0.",
+        default="0.02..1:6",
+    ),
+    frequencies: str = option("LIST", "[Hz], written as the amplitudes.", default="0.1..100:60"),
+    source: str | None = option(
+        "NAME",
+        "Input that is a sine: command, reference (with a controller) or load_torque; in a train <motor>_command, <motor>_reference, "
+        "<shaft>_load_torque ... Default: command or reference of the only motor.",
+        "--input",
+    ),
+    variable: str | None = option(
+        "NAME",
+        "Variable of the response. Default: load_speed, in a train the speed of its last shaft, with a controller the measured "
+        "value of its outermost loop.",
+    ),
+    refine: float | None = option("DB", "Add frequencies where a curve bends by more.", parser=number()),
+    compare: list[str] | None = option("OTHER", "Overlay the drive or train of another scenario."),
     overrides: Overrides = None,
     output: ReportOption = None,
     figures: FiguresOption = None,

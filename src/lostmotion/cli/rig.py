@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
-from .arguments import FiguresOption, ReportOption, complete_on_rig
+from .arguments import FiguresOption, ReportOption, argument, complete_on_rig, option
 from .targets import pictures_of, try_directory, writing
 from .terminal import busy, progress
 
@@ -22,35 +20,24 @@ if TYPE_CHECKING:
 
 
 def rig(
-    name: Annotated[
-        str,
-        typer.Argument(
-            metavar="NAME",
-            help="Gearbox or screw: name in the catalogue, or a file with one record (.toml).",
-            autocompletion=complete_on_rig,
-        ),
-    ],
+    name: str = argument(
+        "NAME",
+        "Gearbox or screw: name in the catalogue, or a file with one record (.toml).",
+        default=...,
+        autocompletion=complete_on_rig,
+    ),
     output: ReportOption = None,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help='Change or add a value, e.g. --set temperature="40 degC".'),
-    ] = None,
-    logs: Annotated[
-        Path | None,
-        typer.Option(
-            "--logs",
-            metavar="DIR",
-            help="Write logs of the rig's experiments and the file that identifies the gearbox from them, instead of the page.",
-        ),
-    ] = None,
-    ripple: Annotated[
-        str | None,
-        typer.Option(
-            "--ripple",
-            metavar="'ORDER TORQUE'",
-            help='With --logs: torque ripple of the input shaft, so many periods in one turn, e.g. --ripple "2 0.02 N*m".',
-        ),
-    ] = None,
+    overrides: list[str] | None = option(
+        "KEY=VALUE", 'Change or add a value, e.g. --set temperature="40 degC".', "--set"
+    ),
+    logs: Path | None = option(
+        "DIR",
+        "Write logs of the rig's experiments and the file that identifies the gearbox from them, instead of the page.",
+    ),
+    ripple: str | None = option(
+        "'ORDER TORQUE'",
+        'With --logs: torque ripple of the input shaft, so many periods in one turn, e.g. --ripple "2 0.02 N*m".',
+    ),
     figures: FiguresOption = None,
 ) -> None:
     """To see what a gearbox or screw does, beside its data sheet.

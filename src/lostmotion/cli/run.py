@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
-
-from .arguments import Overrides, SourceArgument, again, load_scenario, number, print_timed_moves
+from .arguments import Overrides, SourceArgument, again, flag, load_scenario, number, option, print_timed_moves
 from .targets import try_file, try_page
 from .terminal import about, busy, conclude, simulating
 
@@ -21,55 +19,25 @@ PICTURES = (".png", ".svg", ".pdf")
 def run(
     scenario: SourceArgument,
     overrides: Overrides = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="Result file: .nc, .csv or .parquet.")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the run: .png, .svg or .pdf.")
-    ] = None,
-    figure: Annotated[
-        str | None,
-        typer.Option(
-            "--figure", metavar="NAME", help="Part that --plot shows: motion, losses, contacts or energy. Default: all."
-        ),
-    ] = None,
-    spectrum: Annotated[
-        bool,
-        typer.Option(
-            "--spectrum",
-            help="Periodic error at constant speed, by the order of each shaft's revolution, and the part that causes it.",
-        ),
-    ] = False,
-    report: Annotated[
-        Path | None,
-        typer.Option("--report", metavar="FILE", help="Page of the run with all charts and its data: .html."),
-    ] = None,
-    explain: Annotated[
-        float | None,
-        typer.Option(
-            "--explain",
-            metavar="TIME",
-            parser=number("s", "--explain"),
-            help="Print which contacts are stuck at this instant [s], what they hold, and what would free them.",
-        ),
-    ] = None,
-    solver: Annotated[
-        str | None,
-        typer.Option(
-            "--solver",
-            metavar="NAME",
-            help="exact, or dormand-prince as a second opinion, which a stepper with a winding needs.",
-        ),
-    ] = None,
-    tolerance: Annotated[
-        float | None,
-        typer.Option(
-            "--tolerance",
-            metavar="VALUE",
-            parser=number(),
-            help="Relative tolerance of dormand-prince, 1e-15 to 1e-3 (1e-8).",
-        ),
-    ] = None,
+    output: Path | None = option("FILE", "Result file: .nc, .csv or .parquet.", "-o", "--output"),
+    plot: Path | None = option("FILE", "Figure of the run: .png, .svg or .pdf."),
+    figure: str | None = option("NAME", "Part that --plot shows: motion, losses, contacts or energy. Default: all."),
+    spectrum: bool = flag(
+        "Periodic error at constant speed, by the order of each shaft's revolution, and the part that causes it.",
+        "--spectrum",
+    ),
+    report: Path | None = option("FILE", "Page of the run with all charts and its data: .html."),
+    explain: float | None = option(
+        "TIME",
+        "Print which contacts are stuck at this instant [s], what they hold, and what would free them.",
+        parser=number("s", "--explain"),
+    ),
+    solver: str | None = option(
+        "NAME", "exact, or dormand-prince as a second opinion, which a stepper with a winding needs."
+    ),
+    tolerance: float | None = option(
+        "VALUE", "Relative tolerance of dormand-prince, 1e-15 to 1e-3 (1e-8).", parser=number()
+    ),
 ) -> None:
     """To see how a drive moves: run it, plot it, explain it.
 

@@ -3,11 +3,8 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
 
-import typer
-
-from .arguments import SourceArgument
+from .arguments import SourceArgument, option
 
 
 def scenarios() -> None:
@@ -31,15 +28,14 @@ def scenarios() -> None:
 
 
 def new(
-    scenario: SourceArgument,
-    output: Annotated[Path, typer.Option("-o", "--output", metavar="FILE.toml", help="The copy.")],
+    scenario: SourceArgument, output: Path = option("FILE.toml", "The copy.", "-o", "--output", default=...)
 ) -> None:
     """To start a file of your own: copy a shipped one with comments.
 
     \b
     lostmotion new position-axis -o my.toml
     """
-    from ..atomic_writer import write_whole
+    from ..atomic_writer import write_bytes
     from ..errors import InputError, need
     from ..simulation.scenario.scenario_files import find_scenario
     from ..simulation.scenario.scenario_writer import changed_text
@@ -50,12 +46,7 @@ def new(
             raise InputError(f"{path}: a scenario is a TOML file; its name must end in .toml")
     if output.exists():
         raise InputError(f"{output}: exists; name another file")
-    text = changed_text(find_scenario(scenario), {}, output, [])
-
-    def write(path: Path) -> None:
-        path.write_text(text, encoding="utf-8")
-
-    write_whole(output, write)
+    write_bytes(output, changed_text(find_scenario(scenario), {}, output, []).encode())
     print(f"Scenario written to {output}")
     print(f"Next: lostmotion run {output}")
 

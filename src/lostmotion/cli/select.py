@@ -2,18 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Annotated
-
-import typer
-
+from .arguments import argument
 from .study import OutputOption, ProcessesOption, SchedulerOption, ThreadsOption, compute, print_outcome, runs_directory
 
 
 def select(
-    task: Annotated[
-        str,
-        typer.Argument(metavar="TASK.toml", help="Task file: the motion, the load and the requirements of the axis."),
-    ],
+    task: str = argument("TASK.toml", "Task file: the motion, the load and the requirements of the axis.", default=...),
     output: OutputOption = None,
     threads: ThreadsOption = None,
     processes: ProcessesOption = None,

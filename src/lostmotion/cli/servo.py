@@ -5,9 +5,7 @@ from __future__ import annotations
 import sys
 from collections.abc import Mapping
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING, Any
 
 from .arguments import (
     FiguresOption,
@@ -15,8 +13,10 @@ from .arguments import (
     SourceArgument,
     again,
     decibels,
+    flag,
     load_scenario,
     number,
+    option,
     print_bare,
     print_timed_moves,
 )
@@ -34,79 +34,40 @@ OF_RULES = ("--phase-margin", "--gain-margin", "--bandwidth", "--sensitivity-pea
 
 def servo(
     scenario: SourceArgument,
-    output: Annotated[
-        list[Path] | None,
-        typer.Option(
-            "-o",
-            "--output",
-            metavar="FILE.toml|DIR",
-            help="Tuned scenario (.toml), or directory of the report, made if missing; both by giving it twice.",
-        ),
-    ] = None,
-    motor: Annotated[
-        str | None,
-        typer.Option("--motor", metavar="NAME", help="Motor whose controller is examined. Default: the only one."),
-    ] = None,
-    window: Annotated[
-        str | None,
-        typer.Option(
-            "--window",
-            metavar="ANGLE",
-            help='Within which a move has settled, e.g. "1 arcmin", of a slide "5 um"; left out, four encoder steps at the reference\'s '
-            "shaft, at least a thousandth of the longest move.",
-        ),
-    ] = None,
-    rule: Annotated[
-        str | None,
-        typer.Option(
-            "--tune",
-            metavar="RULE",
-            help="Tune first: suited, symmetrical_optimum, identical_damping, identical_radius, identical_real_part, margins or search.",
-        ),
-    ] = None,
-    phase_margin: Annotated[
-        float | None,
-        typer.Option(
-            "--phase-margin",
-            metavar="ANGLE",
-            help='With --tune margins, e.g. "45 deg"; default 60 deg.',
-            parser=number("rad", "--phase-margin"),
-        ),
-    ] = None,
-    gain_margin: Annotated[
-        float | None,
-        typer.Option(
-            "--gain-margin", metavar="DB", help='With --tune margins, e.g. "8 dB"; default 6 dB.', parser=decibels
-        ),
-    ] = None,
-    bandwidth: Annotated[
-        float | None,
-        typer.Option(
-            "--bandwidth",
-            metavar="FREQUENCY",
-            help='With --tune margins: no more gain than this bandwidth of the speed loop takes, e.g. "40 Hz".',
-            parser=number("Hz", "--bandwidth"),
-        ),
-    ] = None,
-    sensitivity_peak: Annotated[
-        float | None,
-        typer.Option(
-            "--sensitivity-peak",
-            metavar="NUMBER",
-            help="With --tune search: largest peak of the sensitivity; default 1.7.",
-            parser=number(),
-        ),
-    ] = None,
-    feedforward: Annotated[
-        bool,
-        typer.Option(
-            "--feedforward",
-            help="With --tune: feed forward inertia and friction too, with the losses of gearboxes without load.",
-        ),
-    ] = False,
-    drive_units: Annotated[
-        bool, typer.Option("--drive-units", help="Print the gains in the units of common drives, to be entered there.")
-    ] = False,
+    output: list[Path] | None = option(
+        "FILE.toml|DIR",
+        "Tuned scenario (.toml), or directory of the report, made if missing; both by giving it twice.",
+        "-o",
+        "--output",
+    ),
+    motor: str | None = option("NAME", "Motor whose controller is examined. Default: the only one."),
+    window: str | None = option(
+        "ANGLE",
+        'Within which a move has settled, e.g. "1 arcmin", of a slide "5 um"; left out, four encoder steps at the reference\'s '
+        "shaft, at least a thousandth of the longest move.",
+    ),
+    rule: str | None = option(
+        "RULE",
+        "Tune first: suited, symmetrical_optimum, identical_damping, identical_radius, identical_real_part, margins or search.",
+        "--tune",
+    ),
+    phase_margin: float | None = option(
+        "ANGLE", 'With --tune margins, e.g. "45 deg"; default 60 deg.', parser=number("rad", "--phase-margin")
+    ),
+    gain_margin: float | None = option("DB", 'With --tune margins, e.g. "8 dB"; default 6 dB.', parser=decibels),
+    bandwidth: float | None = option(
+        "FREQUENCY",
+        'With --tune margins: no more gain than this bandwidth of the speed loop takes, e.g. "40 Hz".',
+        parser=number("Hz", "--bandwidth"),
+    ),
+    sensitivity_peak: float | None = option(
+        "NUMBER", "With --tune search: largest peak of the sensitivity; default 1.7.", parser=number()
+    ),
+    feedforward: bool = flag(
+        "With --tune: feed forward inertia and friction too, with the losses of gearboxes without load.",
+        "--feedforward",
+    ),
+    drive_units: bool = flag("Print the gains in the units of common drives, to be entered there.", "--drive-units"),
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:

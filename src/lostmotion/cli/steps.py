@@ -3,12 +3,9 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from ..errors import InputError
-from .arguments import Overrides, SourceArgument, again, load_scenario
+from .arguments import Overrides, SourceArgument, again, load_scenario, option
 from .grids import parse_grid
 from .run import PICTURES
 from .targets import try_file
@@ -17,22 +14,13 @@ from .terminal import about, busy
 
 def steps(
     scenario: SourceArgument,
-    rates: Annotated[
-        str,
-        typer.Option(
-            "--rates", metavar="LIST", help="Full steps a second [Hz]: 200.0,1000.0 or 100..5000:12 by ratios."
-        ),
-    ] = "100..5000:10",
-    motor: Annotated[
-        str | None, typer.Option("--motor", metavar="NAME", help="Stepper. Default: the only one.")
-    ] = None,
+    rates: str = option(
+        "LIST", "Full steps a second [Hz]: 200.0,1000.0 or 100..5000:12 by ratios.", default="100..5000:10"
+    ),
+    motor: str | None = option("NAME", "Stepper. Default: the only one."),
     overrides: Overrides = None,
-    output: Annotated[
-        Path | None, typer.Option("-o", "--output", metavar="FILE", help="File of the curves: .csv.")
-    ] = None,
-    plot: Annotated[
-        Path | None, typer.Option("--plot", metavar="FILE", help="Figure of the curves: .png, .svg or .pdf.")
-    ] = None,
+    output: Path | None = option("FILE", "File of the curves: .csv.", "-o", "--output"),
+    plot: Path | None = option("FILE", "Figure of the curves: .png, .svg or .pdf."),
 ) -> None:
     """To see how fast a stepper may step: torques over the step rate.
 
@@ -43,7 +31,7 @@ def steps(
     Pull-out and pull-in torque follow from the data, and from runs with the axis as it is. The swing of the rotor in its field shows
     the step rates at which steps meet a resonance.
     """
-    from ..atomic_writer import write_whole
+    from ..atomic_writer import write_bytes, write_whole
     from ..reports.stepper_curves import as_csv, charts, table
     from ..sizing.pull_out_curves import stepper_curves
 
@@ -58,11 +46,7 @@ def steps(
         curves = stepper_curves(loaded, values, motor=motor)
     print("\n".join(table(curves)))
     if output is not None:
-
-        def write(path: Path) -> None:
-            path.write_text(as_csv(curves), encoding="utf-8")
-
-        write_whole(output, write)
+        write_bytes(output, as_csv(curves).encode())
         print(f"Curves written to {output}")
     if plot is not None:
         from ..reports.plots import draw

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from .arguments import FiguresOption, count
+from .arguments import FiguresOption, argument, count, flag, option
 from .targets import pictures_of, try_directory, writing
 from .terminal import busy, conclude, fail, progress
 from .workers import workers
@@ -31,24 +31,16 @@ SchedulerOption = Annotated[
 
 
 def study(
-    what: Annotated[
-        str,
-        typer.Argument(metavar="STUDY.toml | show | resume", help="Study file; or `show` or `resume` and a directory."),
-    ],
-    shown: Annotated[
-        Path | None, typer.Argument(metavar="[DIR]", help="With `show` and `resume`: the directory of a study.")
-    ] = None,
+    what: str = argument(
+        "STUDY.toml | show | resume", "Study file; or `show` or `resume` and a directory.", default=...
+    ),
+    shown: Path | None = argument("[DIR]", "With `show` and `resume`: the directory of a study."),
     output: OutputOption = None,
     threads: ThreadsOption = None,
     processes: ProcessesOption = None,
     scheduler: SchedulerOption = None,
-    best: Annotated[
-        str | None,
-        typer.Option(
-            "--best", metavar="COLUMN[:largest]", help="With `show`: the ten runs with the least, or largest."
-        ),
-    ] = None,
-    repair: Annotated[bool, typer.Option("--repair", help="Make damaged parts of the directory again.")] = False,
+    best: str | None = option("COLUMN[:largest]", "With `show`: the ten runs with the least, or largest."),
+    repair: bool = flag("Make damaged parts of the directory again.", "--repair"),
     figures: FiguresOption = None,
 ) -> None:
     """To see what tolerances do: run many variants of a scenario.

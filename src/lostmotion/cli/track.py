@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from .arguments import (
     FiguresOption,
@@ -17,6 +15,7 @@ from .arguments import (
     as_number,
     load_scenario,
     number,
+    option,
     print_bare,
 )
 from .targets import pictures_of, writing
@@ -29,31 +28,19 @@ if TYPE_CHECKING:
 def track(
     scenario: SourceArgument,
     output: ReportOption = None,
-    after: Annotated[
-        float | None,
-        typer.Option(
-            "--after",
-            metavar="TIME",
-            parser=number("s", "--after"),
-            help='Leave out errors before this time, e.g. "2 s"; default: the end of the start-up transient.',
-        ),
-    ] = None,
-    view: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--view",
-            metavar="MOTOR=ANGLE",
-            help='Whole angle of view of an axis, e.g. "motor=6.65 deg"; default: the angle of view of its camera.',
-        ),
-    ] = None,
-    limit: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--limit",
-            metavar="MOTOR=ANGLE",
-            help='Largest permitted error of an axis, e.g. "motor=10 urad"; the verdict compares the peak with it.',
-        ),
-    ] = None,
+    after: float | None = option(
+        "TIME",
+        'Leave out errors before this time, e.g. "2 s"; default: the end of the start-up transient.',
+        parser=number("s", "--after"),
+    ),
+    view: list[str] | None = option(
+        "MOTOR=ANGLE",
+        'Whole angle of view of an axis, e.g. "motor=6.65 deg"; default: the angle of view of its camera.',
+    ),
+    limit: list[str] | None = option(
+        "MOTOR=ANGLE",
+        'Largest permitted error of an axis, e.g. "motor=10 urad"; the verdict compares the peak with it.',
+    ),
     overrides: Overrides = None,
     figures: FiguresOption = None,
 ) -> None:

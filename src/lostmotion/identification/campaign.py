@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..atomic_writer import write_whole
+from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
@@ -295,25 +295,18 @@ def write_campaign(
     scenario = rig_scenario(gearbox, title, ripple)
     tables = identification(gearbox, title, ripple)
     (directory / "logs").mkdir(parents=True, exist_ok=True)
-    _write(directory / "rig.toml", scenario_text(scenario, title))
+    write_bytes(directory / "rig.toml", scenario_text(scenario, title).encode())
     note = "Logs of the virtual rig: start values are 25 % off, and found again as well as such sensors allow."
-    _write(directory / "identify.toml", toml_text(tables, note))
+    write_bytes(directory / "identify.toml", toml_text(tables, note).encode())
     rig = Rig(Identification(**tables), directory)
     noise = deviations(gearbox) | {name: 0.5 * step for name, step in ENCODERS.items()}
     values, _ = parameters(gearbox, ripple)
     for k, plan in enumerate(experiments(gearbox, ripple)):
         log = virtual_log(rig, plan, values, noise=noise, seed=seed + k)
-        _write(directory / "logs" / plan.name, _csv(log))
+        write_bytes(directory / "logs" / plan.name, _csv(log).encode())
         if progress is not None:
             progress(plan.name)
     return directory / "identify.toml"
-
-
-def _write(path: Path, text: str) -> None:
-    def write(temporary: Path) -> None:
-        temporary.write_text(text, encoding="utf-8")
-
-    write_whole(path, write)
 
 
 def _csv(log: Log) -> str:
