@@ -13,7 +13,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.inputs.schema import unit_in_schema
 from lostmotion.live_page.description import describe
-from lostmotion.portable import fmi2, fmi3, fmu
+from lostmotion.portable import fmi, fmu
 from lostmotion.portable.derivation import derivation_of
 from lostmotion.portable.descriptions import numbers_of
 from lostmotion.reports.page import render
@@ -384,9 +384,9 @@ def test_no_unit_of_rotation_on_a_slide_in_an_fmu_or_the_live_page():
     units = {p.key: p.unit for p in parameters if p.key.startswith("controllers.motor.position_encoder")}
     assert units.pop("controllers.motor.position_encoder.error_phase") == "rad"  # of its sine
     assert set(units.values()) == {"m"}
-    for version in (fmi2, fmi3):
+    for version in (2, 3):
         model = fmu._model(scenario, parameters, "0" * 32, True, ())
-        described = version.model_description(model).decode()
+        described = fmi.model_description(model, version).decode()
         assert rotary(re.findall(r"<\w+[^>]*name=\"[^>]*>", described)) == []
         assert 'unit="m/s"' in described
     page = describe(scenario, "axis")

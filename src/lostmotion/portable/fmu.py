@@ -26,35 +26,22 @@ from ..simulation.runs.run import run
 from ..simulation.scenario.requirements import need_no_impacts
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.variables_of_trains import axis_variables
-from . import fmi2, fmi3
 from .checkout import made_here
 from .dependencies import dependencies_of
 from .derivation import Parameter, derivation_of
 from .descriptions import kernel_of, numbers_of, written
+from .fmi import model_description, terminals
 from .fmu_model import Declared, Model, page
 from .fmu_sources import source_files
 
 # Directories and extensions of the libraries in an FMU, by the names that the builds have here.
 # FMI 2.0 leaves those beside x86-64 to the tools; these are the names of FMI 3.0.
-_OTHERS = {
-    "aarch64-linux": ("aarch64-linux", "so"),
-    "aarch64-windows": ("aarch64-windows", "dll"),
-    "aarch64-darwin": ("aarch64-darwin", "dylib"),
+_ENDINGS = {"linux": "so", "windows": "dll", "darwin": "dylib"}
+_FMI_3 = {
+    f"{cpu}-{system}": (f"{cpu}-{system}", end) for cpu in ("x86_64", "aarch64") for system, end in _ENDINGS.items()
 }
-PLATFORMS: Mapping[int, Mapping[str, tuple[str, str]]] = {
-    2: {
-        "x86_64-linux": ("linux64", "so"),
-        "x86_64-windows": ("win64", "dll"),
-        "x86_64-darwin": ("darwin64", "dylib"),
-        **_OTHERS,
-    },
-    3: {
-        "x86_64-linux": ("x86_64-linux", "so"),
-        "x86_64-windows": ("x86_64-windows", "dll"),
-        "x86_64-darwin": ("x86_64-darwin", "dylib"),
-        **_OTHERS,
-    },
-}
+_FMI_2 = {"x86_64-linux": ("linux64", "so"), "x86_64-windows": ("win64", "dll"), "x86_64-darwin": ("darwin64", "dylib")}
+PLATFORMS: Mapping[int, Mapping[str, tuple[str, str]]] = {2: _FMI_3 | _FMI_2, 3: _FMI_3}
 LIBRARIES = Path(__file__).parents[1] / "fmu_libraries"
 
 
@@ -152,14 +139,14 @@ def export_fmu(
 
     def write(to: Path) -> None:
         with zipfile.ZipFile(to, "w", zipfile.ZIP_DEFLATED) as archive:
-            archive.writestr("modelDescription.xml", (fmi2 if fmi == 2 else fmi3).model_description(model))
+            archive.writestr("modelDescription.xml", model_description(model, fmi))
             archive.writestr("resources/scenario.bin", resource)
             archive.writestr("resources/names.txt", model.names())
             archive.writestr("documentation/index.html", page(model))
             if fmi == 2:
                 archive.writestr("model.png", icon)
             else:
-                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", fmi3.terminals(scenario.train(), model))
+                archive.writestr("terminalsAndIcons/terminalsAndIcons.xml", terminals(scenario.train(), model))
                 archive.writestr("terminalsAndIcons/icon.png", icon)
             for name, content in binaries.items():
                 archive.writestr(f"binaries/{name}", content)
@@ -262,6 +249,8 @@ def _model(
         by_name |= {v.name: v for v in _given_motion(train, shaft)}
     positions = _positions(train, motions, by_name)
     windings = any(c.current.kind == "field_oriented" for c in axes.values())
+    exchanged = () if windings or positions else states
+    of_states = [by_name.get(s) or Declared(s, "1", "state of a controller", 0.0) for s in exchanged]
     given = {train.variable(motor, "reference"): c for motor, c in scenario.axes().items() if references_given}
     references = [
         Declared(name, *_reference(scenario, name.removesuffix("reference"), c.reference.kind), 0.0)
@@ -287,10 +276,10 @@ def _model(
         ],
         # The quotient of two outputs is undefined while the drive stands, which no tool expects.
         outputs=[v for name, v in by_name.items() if name not in inputs and name != "efficiency"],
-        states=[]
-        if windings or positions
-        else [_fine(by_name.get(s) or Declared(s, "1", "state of a controller", 0.0)) for s in states],
-        state_starts=[] if windings or positions else [_start_of(scenario, s) for s in states],
+        # With a hundredth of their size: integrators take their absolute tolerance from there, and small speeds decide
+        # the motion after a standstill.
+        states=[replace(v, size=v.size / 100.0) for v in of_states],
+        state_starts=[float(start.get(v.name, 0.0)) for v in of_states],
         indicators=core.guards(),  # those beyond the guards of a regime are 1
         parameters=list(parameters),
         references_given=references_given,
@@ -325,17 +314,6 @@ def _given_position(train: DriveTrain, shaft: str) -> Declared:
     """The input that gives its position beside these."""
     meaning = "position that the slide has" if train.is_slide(shaft) else "angle that the shaft has"
     return Declared(train.variable(shaft, "given_angle"), train.angle_unit(shaft), meaning, 0.0)
-
-
-def _fine(state: Declared) -> Declared:
-    """A state with a hundredth of its size. Integrators take their absolute tolerance from there, and small speeds
-    decide the motion after a standstill."""
-    return replace(state, size=state.size / 100.0)
-
-
-def _start_of(scenario: Scenario, state: str) -> float:
-    """A state at t = 0; times of controllers begin at 0."""
-    return float(scenario.start().get(state, 0.0))
 
 
 def _sizes(scenario: Scenario) -> tuple[dict[str, float], list[str]]:

@@ -9,22 +9,12 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from ..simulation.runs.results import installed_version
 from ..units.grammar import read_unit
 from .derivation import Parameter
 
 # bindings/fmu/variables.hpp has the same.
-FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE, FIRST_INDICATOR, FIRST_PARAMETER = (
-    1000,
-    2000,
-    3000,
-    5000,
-    6000,
-    7000,
-    1_000_000,
-)
-
-TOLERANCE = "1e-8"  # relative, of integrators in Model Exchange
+FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE = 1000, 2000, 3000, 5000, 6000
+FIRST_INDICATOR, FIRST_PARAMETER = 7000, 1_000_000
 
 # Powers of kg, m, s, A, K, rad.
 _BASE = {
@@ -152,24 +142,6 @@ def _product(unit: str) -> Mapping[str, int]:
     if unit in ("1", "J"):
         return {"joule": 1} if unit == "J" else {}
     return read_unit(unit)
-
-
-def generation_tool() -> str:
-    """The attribute generationTool."""
-    return f"lostmotion {installed_version()}"
-
-
-def add_log_categories(root: ET.Element) -> None:
-    """The categories of messages."""
-    categories = ET.SubElement(root, "LogCategories")
-    ET.SubElement(categories, "Category", name="logStatusError")
-    ET.SubElement(categories, "Category", name="logStatusDiscard")
-
-
-def add_default_experiment(root: ET.Element, model: Model) -> None:
-    """Duration and sample interval of the scenario, and the tolerance at which an integrator gives its run."""
-    times = {"startTime": "0", "stopTime": repr(model.duration), "stepSize": repr(model.step)}
-    ET.SubElement(root, "DefaultExperiment", times | {"tolerance": TOLERANCE})
 
 
 def parameter_meaning(p: Parameter) -> str:
