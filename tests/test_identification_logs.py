@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from lostmotion.identification.preparation.screening import screened
-from lostmotion.identification.readers.channel_units import channel_factor
+from lostmotion.identification.readers.channel_units import channel_unit
 from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.readers.log_files import find_logs, read_log
 from refusals import refused
@@ -121,7 +121,7 @@ def test_every_format_gives_the_same_log(tmp_path: Path, name: str, write: Calla
     log = read_log(tmp_path / name)
     assert log.time == pytest.approx(TIME, abs=1e-9)
     channel = log.channels["run/position" if name == "log.h5" else "position"]
-    assert channel.values * channel_factor("", channel.unit, "rad", name) == pytest.approx(ANGLE, abs=1e-9)
+    assert channel.values * channel_unit("", channel.unit, "rad", name)[0] == pytest.approx(ANGLE, abs=1e-9)
     assert header.items() <= log.header.items()
 
 

@@ -9,6 +9,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.validation import shortened
+from ..units.practical import counted
 from .candidate_models import mean_errors, with_own
 from .fit.least_squares import Fit, problem_of, search
 from .fit.log_errors import log_errors
@@ -20,14 +21,7 @@ Notify = Callable[[str, int, float], None]
 
 @dataclass(frozen=True)
 class ConditionError:
-    """Error of the logs of one condition, with these logs in the fit and without them.
-
-    Examples
-    --------
-    >>> from lostmotion.identification.left_out_conditions import ConditionError
-    >>> print(ConditionError("mass", 0.5, 3, 0.002, 0.0025, "").text("rad"))
-    mass = 0.5 (3 logs): mean absolute error 0.002 rad, 0.0025 rad when fitted without them
-    """
+    """Error of the logs of one condition, with these logs in the fit and without them."""
 
     key: str  # key of the header, or `file` or `folder`
     value: Any  # value of the key in these logs
@@ -46,8 +40,7 @@ class ConditionError:
         """One line, with errors in a unit; one SI unit has so many of it."""
         unit = f" {unit}".rstrip()
         without = self.failed or f"{factor * self.left_out:.4g}{unit} when fitted without them"
-        logs = f"{self.logs} log{'' if self.logs == 1 else 's'}"
-        return f"{self.name} ({logs}): mean absolute error {factor * self.fitted:.4g}{unit}, {without}"
+        return f"{self.name} ({counted(self.logs, 'log')}): mean absolute error {factor * self.fitted:.4g}{unit}, {without}"
 
 
 def left_out_errors(

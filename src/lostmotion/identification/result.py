@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from ..errors import InputError
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.scenario_files import scenario_text
-from ..units.practical import OF_ERRORS
+from ..units.practical import OF_ERRORS, counted
 from ..verdict import Point, Verdict
 from .candidate_models import GAIN, RungResult
 from .fit.intervals import Interval
@@ -131,7 +131,9 @@ class IdentificationResult:
             for held_out, what in ((False, "fitted"), (True, "held out")):
                 if text := self._error_text(channel, held_out=held_out):
                     own = [e for e in self.errors if e.held_out == held_out and e.channel == channel]
-                    lines.append(f"  {channel}, {_logs(sum(not math.isnan(e.mae) for e in own))} {what}: {text}")
+                    lines.append(
+                        f"  {channel}, {counted(sum(not math.isnan(e.mae) for e in own), 'log')} {what}: {text}"
+                    )
         lines += [f"  {condition.text(*self.error_unit())}" for condition in self.conditions]
         lines += [f"  {u.text}" for u in self.undetermined] + [f"  {text}" for text in self.at_bounds]
         return lines + [f"  {text}" for text in [*self.differences(), *self.inputs, *self.starts()]]
@@ -240,9 +242,9 @@ class IdentificationResult:
         """Source of the values, for records."""
         fitted = sum(not log.held_out for log in self.logs)
         files, rung = ", ".join(self.task.logs.files), self.rungs[self.chosen].name
-        text = f"identified from {_logs(fitted)} ({files}), {rung}"
+        text = f"identified from {counted(fitted, 'log')} ({files}), {rung}"
         if held_out := self.errors_text(held_out=True):
-            return f"{text}; error of {_logs(len(self.logs) - fitted)} held out: {held_out}"
+            return f"{text}; error of {counted(len(self.logs) - fitted, 'log')} held out: {held_out}"
         return f"{text}; error of the fit, since no log was held out: {self.errors_text(held_out=False)}"
 
     def scenario_text(self) -> str:
@@ -267,10 +269,6 @@ class IdentificationResult:
         return sheet_text(
             gear_sheet(self.scenario.gears[name], f"{plain}-identified", self.task.title or name, self.source())
         )
-
-
-def _logs(count: int) -> str:
-    return f"{count} log{'' if count == 1 else 's'}"
 
 
 def _sized(value: float, unit: str, factor: float) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from .preparation.prepare import prepared
-from .readers.channel_units import channel_factor
+from .readers.channel_units import channel_unit
 from .readers.log import Channel, Log
 from .rig.rig_runs import run_log
 from .rig.rig_scenario import Rig
@@ -53,7 +53,7 @@ def virtual_log(
         step = number(m.resolution, {}, f"measured.{name}.resolution")
         x = step * np.round(x / step) if step > 0.0 else x
         of_plan = plan.channels[m.channel].unit if m.channel in plan.channels else ""
-        factor = channel_factor(m.unit, of_plan, rig.units.get(m.variable, ""), f"measured.{name}")
+        factor, _ = channel_unit(m.unit, of_plan, rig.units.get(m.variable, ""), f"measured.{name}")
         channels[m.channel] = Channel(x / factor, m.unit or of_plan)
     return replace(plan, channels=channels)
 

@@ -11,7 +11,7 @@ from ..control.controller import Controller
 from ..data_sheets.actuator_sheet import ActuatorSheet
 from ..data_sheets.components import actuator, gearbox
 from ..data_sheets.records import catalogue
-from ..errors import InputError, need
+from ..errors import InputError, need, prefixed
 from ..inputs.arguments import checked
 from ..inputs.validation import did_you_mean, shown
 from ..model.drive import Drive
@@ -21,6 +21,7 @@ from ..model.train import DriveTrain
 from ..simulation.runs.loading import load
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.shipped_scenarios import shipped_scenarios
+from ..simulation.stepping.robot_joints import output_of
 from .driven_robot import MAX_SUBSTEPS, Actuated
 from .joints import acts, compiled, joint_id
 from .mjcf import JointActuator
@@ -30,21 +31,21 @@ if TYPE_CHECKING:
     import mujoco
 
 
-def drive_of_joint(joint: str, given: Any, controller: Controller | None) -> Scenario:
+def drive_of_joint(given: Any, controller: Controller | None) -> Scenario:
     """Return the argument of `attach` for a joint as a scenario, with the controller if there is one."""
     if isinstance(given, str | Path):
-        given = _named(joint, str(given))
+        given = _named(str(given))
     if not isinstance(given, Drive | DriveTrain | Scenario):
         raise InputError(
-            f"joint {joint!r}: {shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox or an actuator of the catalogue"
+            f"{shown(given)} is no drive; give a Drive, a DriveTrain, a scenario, or the name of a gearbox or an actuator of the catalogue"
         )
     scenario = Scenario.of_any(given)
     if controller is None:
         return scenario
     if own := list(scenario.tables.controllers):
-        raise InputError(f"joint {joint!r}: a controller of its own turns the motor {own[0]}; leave one of them out")
+        raise InputError(f"a controller of its own turns the motor {own[0]}; leave one of them out")
     if len(motors := scenario.train().motors) != 1:
-        raise InputError(f"joint {joint!r}: {len(motors) or 'no'} motors turn it, and a joint is turned by one")
+        raise InputError(f"{len(motors) or 'no'} motors turn it, and a joint is turned by one")
     return scenario.with_axes(dict.fromkeys(motors, controller))
 
 
@@ -59,28 +60,36 @@ def alone_on_joint(
     """
     heavy = (robot.body_mass > 0.0) & (robot.body_gravcomp != 1.0)
     weighs = bool(robot.opt.gravity.any() and heavy.any()) and acts(robot, "GRAVITY")
-    drive = without_weight(joint, drive_of_joint(joint, given, controller), replace=replace, weighs=weighs)
-    clear(robot, joint, drive, replace=replace, put=put)
+    drive = without_loads(joint, given, controller, replace=replace, weighs=weighs)
+    with prefixed(f"joint {joint!r}"):
+        clear(robot, joint, drive, replace=replace, put=put)
     return drive
 
 
-def _named(joint: str, name: str) -> Drive | Scenario:
+def without_loads(joint: str, given: Any, controller: Controller | None, *, replace: bool, weighs: bool) -> Scenario:
+    """The drive of a joint without the loads and weights that the robot has."""
+    with prefixed(f"joint {joint!r}"):
+        drive = drive_of_joint(given, controller)
+    output_of(joint, drive.train())  # refuses a train whose end it does not find
+    with prefixed(f"joint {joint!r}"):
+        return without_weight(joint, drive, replace=replace, weighs=weighs)
+
+
+def _named(name: str) -> Drive | Scenario:
     """Shipped scenario or scenario file by its name; an actuator of the catalogue; a gearbox, with an ideal torque source."""
     if name.endswith(".toml") or name in shipped_scenarios():
         return load(name)
     record = next((record for record in catalogue() if record.name == name), None)
     if record is None:
         meant = did_you_mean(name, [record.name for record in catalogue()], "`lostmotion catalogue` lists its names")
-        raise InputError(
-            f"joint {joint!r}: {shown(name)} is neither a scenario nor a gearbox or an actuator of the catalogue; {meant}"
-        )
+        raise InputError(f"{shown(name)} is neither a scenario nor a gearbox or an actuator of the catalogue; {meant}")
     if isinstance(record, ActuatorSheet):
         motor, box = actuator(name)
         return Drive(motor=motor, gearbox=box, load=Load(inertia=1.0))
     box = gearbox(name)
     if not box.inertia > 0.0:
         raise InputError(
-            f"joint {joint!r}: the record {name!r} has no inertia of its input shaft; give lm.Drive(...) with a motor and its rotor_inertia"
+            f"the record {name!r} has no inertia of its input shaft; give lm.Drive(...) with a motor and its rotor_inertia"
         )
     motor = Motor(kind="torque_source", rotor_inertia=0.0)
     return Drive(motor=motor, gearbox=box, load=Load(inertia=1.0))

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..control.continuous import ContinuousController
-from ..errors import InputError, need
+from ..errors import InputError, need, prefixed
 from ..inputs.arguments import checked
 from ..inputs.named_elements import Named
 from ..inputs.quantities import Number
@@ -48,11 +48,14 @@ UNLIMITED = (-math.inf, math.inf)
 class JointActuator:
     """A drive as the actuator of a joint, with the control of an actuator in MuJoCo. `from_mjcf` returns it, `attach` takes it."""
 
-    drive: Driven  #: drive of the joint, with its controller if the actuator is a servo
+    drive: Driven
+    """drive of the joint, with its controller if the actuator is a servo"""
     scale: float = 1.0
     """from the control to what the drive is given: the torque of its motor [N·m], or the reference of its controller [rad, rad/s]"""
-    lower: float = -math.inf  #: least control; a smaller one counts as this one
-    upper: float = math.inf  #: greatest control
+    lower: float = -math.inf
+    """least control; a smaller one counts as this one"""
+    upper: float = math.inf
+    """greatest control"""
 
     def given(self, control: float) -> float:
         """Command or reference of the drive for a control."""
@@ -114,33 +117,37 @@ def from_mjcf(
     30.0
     """
     need("mujoco", "lostmotion.mujoco", "mujoco")
-
     model = compiled(model)
     number = joint_id(model, joint)
+    with prefixed(f"joint {joint!r}"):
+        return _of_joint(model, number, ratio)
+
+
+def _of_joint(model: mujoco.MjModel, number: int, ratio: float | None) -> Drive | DriveTrain | JointActuator:
     dof = model.jnt_dofadr[number]
     actuators = actuators_of(model, number)
     if len(actuators) > 1:
         names = " and the ".join(actuator_name(model, k) for k in actuators)
-        raise InputError(f"joint {joint!r}: has the {names}; leave one of them")
+        raise InputError(f"has the {names}; leave one of them")
     if not actuators and ratio is None:
-        raise InputError(f"joint {joint!r}: has no actuator that says the gear; give ratio=")
-    law = _law(model, joint, actuators[0]) if actuators else _Law(gear=ratio or 0.0)
+        raise InputError("has no actuator that says the gear; give ratio=")
+    law = _law(model, actuators[0]) if actuators else _Law(gear=ratio or 0.0)
     servo = law.bias != (0.0, 0.0)
     if ratio is None:
         ratio = abs(law.gear) if servo else law.gear
     if ratio == 0.0 or law.gear == 0.0:
-        raise InputError(f"joint {joint!r}: has the ratio 0; give speed of the motor / speed of the joint")
+        raise InputError("has the ratio 0; give speed of the motor / speed of the joint")
     if servo and ratio < 0.0:
         raise InputError(
             f"{ratio:g} must be above 0 for a servo, whose reference is the position or speed of the joint", "ratio"
         )
-    _refuse_of_joint(model, joint, number)
+    _refuse_of_joint(model, number)
     armature, damping = float(model.dof_armature[dof]), float(model.dof_damping[dof])
     for k in actuators:
         armature += law.gear * law.gear * float(model.actuator_armature[k])
         damping += law.gear * law.gear * float(model.actuator_damping[k])
     if not armature > 0.0:
-        raise InputError(f"joint {joint!r}: has no armature, which is the inertia of the rotor; give the joint one")
+        raise InputError("has no armature, which is the inertia of the rotor; give the joint one")
     drive = Drive(
         motor=Motor(kind="torque_source", rotor_inertia=armature / (ratio * ratio)),
         gearbox=Gearbox(
@@ -162,14 +169,17 @@ def from_mjcf(
         load = train.shafts["load"].model_copy(update={"domain": "translation"})
         train = train.model_copy(update={"shafts": Named({**train.shafts, "load": load})})
     if servo:
-        return _servo(joint, train, law)
+        return _servo(train, law)
     given = train if springs or slides else drive
-    made = _motor(joint, given, law, ratio)
+    made = _motor(given, law, ratio)
     return given if made == JointActuator(given) else made
 
 
-def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
-    """The law of an actuator on a joint."""
+def _law(model: mujoco.MjModel, k: int) -> _Law:
+    """The law of an actuator on a joint.
+
+    Raises InputError: it has another one, or an attribute that is not taken over.
+    """
     import mujoco
 
     def refuse(attribute: str, value: Any) -> InputError:
@@ -177,7 +187,6 @@ def _law(model: mujoco.MjModel, joint: str, k: int) -> _Law:
         return InputError(
             f"{shown} of the {actuator_name(model, k)} is not taken over; give a motor, or a servo of position or speed, without it",
             attribute,
-            where=f"joint {joint!r}",
         )
 
     if not acts(model, "ACTUATION") or model.opt.disableactuator >> int(model.actuator_group[k]) & 1:
@@ -230,7 +239,7 @@ def _usual() -> dict[str, Any]:
     return {field: getattr(plain, f"actuator_{field}")[0] for field in left}
 
 
-def _refuse_of_joint(model: mujoco.MjModel, joint: str, number: int) -> None:
+def _refuse_of_joint(model: mujoco.MjModel, number: int) -> None:
     """Refuse what a joint has of its drive and is not taken over."""
     dof = model.jnt_dofadr[number]
     for key, value in (
@@ -241,7 +250,7 @@ def _refuse_of_joint(model: mujoco.MjModel, joint: str, number: int) -> None:
     ):
         if np.any(value):
             what = "of higher order " if np.size(value) > 1 else ""
-            raise InputError(f"{what}is not taken over; take it off the joint", key, where=f"joint {joint!r}")
+            raise InputError(f"{what}is not taken over; take it off the joint", key)
 
 
 def _springs(model: mujoco.MjModel, number: int) -> Named[Spring]:
@@ -252,15 +261,15 @@ def _springs(model: mujoco.MjModel, number: int) -> Named[Spring]:
     return Named({"joint": Spring(shaft="load", stiffness=LinearStiffness(stiffness=stiffness), rest_angle=rest)})
 
 
-def _motor(joint: str, drive: Driven, law: _Law, ratio: float) -> JointActuator:
+def _motor(drive: Driven, law: _Law, ratio: float) -> JointActuator:
     if law.gain == 0.0:
-        raise InputError("0 gives no torque; give another gain", "gainprm", where=f"joint {joint!r}")
+        raise InputError("0 gives no torque; give another gain", "gainprm")
     low, high = sorted(force / law.gain for force in law.force)
     lower, upper = (min(max(control, low), high) for control in law.control)
     return JointActuator(drive, law.gain * law.gear / ratio, lower, upper)
 
 
-def _servo(joint: str, train: DriveTrain, law: _Law) -> JointActuator:
+def _servo(train: DriveTrain, law: _Law) -> JointActuator:
     """A servo: ``k_p (r - phi) - k_d w`` of the angle, or ``k_p (r - w)`` of the speed, within a limit."""
     low, high = law.force
     if low != -high or high == 0.0:
@@ -268,7 +277,6 @@ def _servo(joint: str, train: DriveTrain, law: _Law) -> JointActuator:
             f"{low:g} to {high:g} is not taken over; the limit of the torque of a servo must be symmetric",
             "forcerange",
             "actuatorfrcrange",
-            where=f"joint {joint!r}",
         )
     ratio = train.gears["gearbox"].ratio
     per_joint = law.gear * law.gear / ratio

@@ -38,7 +38,6 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
         raise InputError(
             "would count twice: load and weight of the joint come from the robot; give replace=True, or leave it out",
             *keys,
-            where=f"joint {name!r}",
         )
     if inclined:  # load torques of scenarios are not used
         drive = drive.replace(**dict.fromkeys(inclined, 0.0))
@@ -127,15 +126,15 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool, p
     own += [f"the {actuator_name(model, k)}" for k in actuators]
     if own and (put or not replace):
         remedy = "take it off the model before put_model" if put else "give replace=True, or take it off the model"
-        raise InputError(f"joint {name!r}: has {' and '.join(own)}, which would count twice beside its drive; {remedy}")
+        raise InputError(f"has {' and '.join(own)}, which would count twice beside its drive; {remedy}")
     for k in actuators:
         if model.actuator_plugin[k] >= 0:
             raise InputError(
-                f"joint {name!r}: the {actuator_name(model, k)} is a plugin, which would act beside its drive; take it off the model"
+                f"the {actuator_name(model, k)} is a plugin, which would act beside its drive; take it off the model"
             )
     if model.jnt_actgravcomp[joint] and model.ngravcomp:
         raise InputError(
-            f"joint {name!r}: has actuatorgravcomp, a torque of its actuators beside its drive; take gravcomp off the model"
+            "has actuatorgravcomp, a torque of its actuators beside its drive; take gravcomp off the model"
         )
     for places in values.values():
         for array, k in places:

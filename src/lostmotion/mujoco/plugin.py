@@ -18,8 +18,7 @@ from ..portable.descriptions import written
 from ..simulation.forms.train_tables import TrainInitial
 from ..simulation.stepping.robot_joints import joint_drive, output_of
 from ..simulation.stepping.solver_access import solver_train
-from .attaching import drive_of_joint
-from .overlaps import without_weight
+from .attaching import without_loads
 
 LIBRARY = Path(__file__).parent / "plugin_library"
 
@@ -92,8 +91,7 @@ def write_drive(drive: Any, path: str | Path, *, controller: Controller | None =
     <plugin joint="JOINT" plugin="lostmotion.drive"><config key="scenario" value=".../elbow.drive"/></plugin>
     """
     name = Path(path).stem
-    given = drive_of_joint(name, drive, controller)
-    given = without_weight(name, given, replace=replace, weighs=True)
+    given = without_loads(name, drive, controller, replace=replace, weighs=True)
     train = given.train()
     joint = joint_drive(name, given, 1.0, 1e-3, slides=train.is_slide(output_of(name, train)))
     core = solver_train(joint.simulation)

@@ -32,22 +32,19 @@ def model_description(model: Model, fmi: int) -> bytes:
     """The file, of version 2 or 3 of the standard."""
     about = {"fmiVersion": f"{fmi}.0", "modelName": model.title}
     about |= {"generationTool": f"lostmotion {installed_version()}", "variableNamingConvention": "flat"}
+    exchange, simulation = ["providesDirectionalDerivative"], ["canHandleVariableCommunicationStepSize"]
     if fmi == 2:
         about |= {"guid": model.guid, "numberOfEventIndicators": str(model.indicators if model.states else 0)}
         can = ("canNotUseMemoryManagementFunctions", "canGetAndSetFMUstate", "canSerializeFMUstate")
-        exchange, simulation = (
-            ("providesDirectionalDerivative",),
-            ("providesDirectionalDerivative", "canInterpolateInputs"),
-        )
+        simulation += ["canInterpolateInputs", "providesDirectionalDerivative"]
     else:
         about |= {"instantiationToken": model.guid}
         can = ("canGetAndSetFMUState", "canSerializeFMUState", "providesDirectionalDerivatives")
-        exchange, simulation = ("needsCompletedIntegratorStep",), ()
+        exchange = ["needsCompletedIntegratorStep"]
     root = ET.Element("fmiModelDescription", about)
     both = {"modelIdentifier": model.identifier} | dict.fromkeys(can, "true")
     if model.states:
         ET.SubElement(root, "ModelExchange", both | dict.fromkeys(exchange, "true"))
-    simulation = ("canHandleVariableCommunicationStepSize", *simulation)
     ET.SubElement(root, "CoSimulation", both | dict.fromkeys(simulation, "true"))
     for kind in root if model.has_sources and fmi == 2 else ():
         sources = ET.SubElement(kind, "SourceFiles")

@@ -103,12 +103,8 @@ def widest(a: Interval, b: Interval) -> Interval:
 def reach(directions: np.ndarray, room: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Reach of each parameter, down and up, if all move along some of the directions within their room.
 
-    Parameters
-    ----------
-    directions : array (parameters, directions)
-        Of scaled parameters.
-    room : array (parameters, 2)
-        Changes that lead to the lower and upper bound; infinite where there is none.
+    directions: array (parameters, directions), of scaled parameters.
+    room: array (parameters, 2) of the changes that lead to the lower and upper bound; infinite where there is none.
     """
     need("scipy", "Intervals of what logs do not determine", "identify")
     from scipy.optimize import linprog

@@ -5,6 +5,7 @@ from __future__ import annotations
 import hashlib
 import json
 from collections.abc import Mapping, Sequence
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -22,14 +23,14 @@ class Progress:
     """
 
     def __init__(self, path: Path | None) -> None:
-        self._path = path
-        self._kept: dict[str, dict[str, Any]] = {}
+        self.path = path
+        self.kept: dict[str, dict[str, Any]] = {}
         if path is not None and path.is_file():
             try:
                 data = json.loads(path.read_text(encoding="utf-8"))
-                self._kept = data["models"] if data["version"] == __version__ else {}
+                self.kept = data["models"] if data["version"] == __version__ else {}
             except (ValueError, KeyError, TypeError, OSError):
-                self._kept = {}  # of another program, or cut off: the work begins anew
+                self.kept = {}  # of another program, or cut off: the work begins anew
 
     def of(
         self,
@@ -45,26 +46,10 @@ class Progress:
                 digest.update(values.tobytes())
         return Models(self, digest.hexdigest(), others or {})
 
-    def names(self) -> list[str]:
-        """Names of the models that are kept."""
-        return list(dict.fromkeys(name for models in self._kept.values() for name in models))
-
     def finish(self) -> None:
         """Remove the file: the result is complete."""
-        if self._path is not None:
-            self._path.unlink(missing_ok=True)
-
-    def read(self, key: str, name: str) -> dict[str, Any] | None:
-        """Read what is kept of a model."""
-        return self._kept.get(key, {}).get(name)
-
-    def write(self, key: str, name: str, data: dict[str, Any]) -> None:
-        """Keep a model."""
-        if self._path is None:
-            return
-        self._kept.setdefault(key, {})[name] = data
-        self._path.parent.mkdir(parents=True, exist_ok=True)
-        write_bytes(self._path, json.dumps({"version": __version__, "models": self._kept}).encode())
+        if self.path is not None:
+            self.path.unlink(missing_ok=True)
 
 
 class Models:
@@ -77,17 +62,18 @@ class Models:
 
     def fitted(self, name: str) -> tuple[ParameterPoint, list[ParameterPoint]] | None:
         """(values found, other minima) of a model; None if it is not kept."""
-        data = self._progress.read(self._key, name)
-        return (
-            self._others.get(name)
-            if data is None
-            else (ParameterPoint(**data["point"]), [ParameterPoint(**point) for point in data["minima"]])
-        )
+        data = self._progress.kept.get(self._key, {}).get(name)
+        if data is None:
+            return self._others.get(name)
+        return ParameterPoint(**data["point"]), [ParameterPoint(**point) for point in data["minima"]]
 
     def keep(self, name: str, point: ParameterPoint, minima: Sequence[ParameterPoint]) -> None:
         """Keep a model that has been fitted."""
-
-        def plain(p: ParameterPoint) -> dict[str, Any]:
-            return {"values": p.values, "nuisance": p.nuisance}
-
-        self._progress.write(self._key, name, {"point": plain(point), "minima": [plain(p) for p in minima]})
+        progress = self._progress
+        if progress.path is not None:
+            progress.kept.setdefault(self._key, {})[name] = {
+                "point": asdict(point),
+                "minima": list(map(asdict, minima)),
+            }
+            progress.path.parent.mkdir(parents=True, exist_ok=True)
+            write_bytes(progress.path, json.dumps({"version": __version__, "models": progress.kept}).encode())

@@ -80,38 +80,12 @@ def find_change(
     false_alarms: float = 0.01,
     within: int = 1000,
 ) -> Change:
-    """Find a change in a series.
+    """Find a change in a series, whose values are in their order in time.
 
-    Parameters
-    ----------
-    x : array (values,)
-        Values in their order in time.
-    variances : array (values,)
-        Relative variances of the values.
-    conditions : array (values, conditions)
-        Known conditions of each value; a constant is added to them.
-    baseline : int
-        Number of values at the beginning during which nothing changes; at least two more than conditions and constant.
-    direction : {"up", "down", "both"}
-        Direction of the changes that are of interest.
-    false_alarms : float
-        Largest probability of an alarm without a change within `within` values behind the baseline.
-    within : int
-        See `false_alarms`.
-
-    Returns
-    -------
-    Change
-
-    Examples
-    --------
-    >>> import numpy as np
-    >>> from lostmotion.identification.monitor.change_detection import find_change
-    >>> x = np.random.default_rng(0).normal(size=60)
-    >>> x[40:] += 3.0
-    >>> found = find_change(x, np.ones(60), np.zeros((60, 0)), 20)
-    >>> found.alarm, found.begins[0], found.ramp
-    (44, 40, 1)
+    variances: relative, of the values.
+    conditions: array (values, conditions); a constant is added to them.
+    baseline: values at the beginning during which nothing changes; at least two more than conditions and constant.
+    false_alarms: largest probability of an alarm without a change in as many values behind the baseline as `within`.
     """
     n = len(x)
     limit = 1.0 / false_alarms

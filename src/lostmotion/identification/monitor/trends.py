@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ...units.practical import printed
+from ...units.practical import counted, printed
 from ..fit.intervals import Interval
 from ..task.free_parameters import FreeParameter, in_unit
 from ..task.identification_file import Identification
@@ -144,12 +144,10 @@ class _Series:
         if change.alarm is not None:
             words = f"{self._since(change)} from {p.shown(change.before)} to {shown}"
         elif enough:
-            found = f"a step of {p.shown(change.detectable)}{unit} over the last {_logs(min(RECENT, after))} would have been found with 90 %"
+            found = f"a step of {p.shown(change.detectable)}{unit} over the last {counted(min(RECENT, after), 'log')} would have been found with 90 %"
             words = f"{shown}, no {CHANGES[watch.direction]}; {found}"
         else:
-            few = (
-                f"{_logs(after)} after the baseline determine{'s' if after == 1 else ''} it, {change.needed} are needed"
-            )
+            few = f"{counted(after, 'log')} after the baseline determine{'s' if after == 1 else ''} it, {change.needed} are needed"
             words = f"{shown} after {p.shown(change.before)}, not decided whether changed: {few}"
         decided = beyond is not None and (enough or change.alarm is not None)
         first = self._first(change)
@@ -227,7 +225,3 @@ def _against_limits(name: str, p: FreeParameter, watch: Watch, levels: list[Inte
             words += f"; not decided whether beyond {shown}{one}"
     beyond = True if True in states else None if None in states else False
     return beyond, words
-
-
-def _logs(count: int) -> str:
-    return f"{count} log{'' if count == 1 else 's'}"

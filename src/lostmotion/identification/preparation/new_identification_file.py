@@ -18,6 +18,7 @@ from ...inputs.arguments import checked
 from ...inputs.validation import listed
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
+from ...units.practical import counted
 from ..readers.channel_units import channel_unit
 from ..readers.log import Log
 from ..readers.log_files import READERS, read_log
@@ -324,7 +325,7 @@ def _range(values: np.ndarray) -> str:
 
 
 def _channel_lines(seen: Sequence[_Seen], count: int) -> list[str]:
-    lines = ["", f"# Channels, in {count} log{'' if count == 1 else 's'}:"]
+    lines = ["", f"# Channels, in {counted(count, 'log')}:"]
     for c in seen:
         unit = c.unit or "no unit"
         some = f", in {c.logs} of them" if c.logs < count else ""

@@ -17,8 +17,7 @@ from ...errors import InputError
 from ...model.shaft_ratio import turns
 from ...model.torsion import Rigid
 from ..prepared_log import Prepared, Segment
-from ..rig.measured_motion import depends_on_angle
-from ..rig.measured_motion_input import refuse_given_motion
+from ..rig.measured_motion import ShownMotion, shown_motion
 from ..rig.measurement_model import numbers_of
 from ..rig.residuals import start_point
 from ..rig.rig_scenario import Rig
@@ -36,12 +35,9 @@ OFFSETS = ("restart_angle", "restart_speed")  # of the state behind a pause, in 
 
 
 @dataclass(frozen=True)
-class Restart:
+class Restart(ShownMotion):
     """A measured channel that shows the state of a rig that moves as one shaft."""
 
-    channel: str
-    shaft: str
-    is_speed: bool
     ratios: Mapping[str, float]  # turns of each shaft for one of the measured one
     keys: Mapping[str, Mapping[str, str]]  # keys of `initial` for speed and angle of each shaft
 
@@ -113,27 +109,19 @@ def shown_by(rig: Rig, log: Prepared, known: Mapping[str, Any]) -> Restart:
     scenario = built.scenario
     if scenario.axes() or built.remembers:
         raise InputError("no channel shows the states of its controller")
-    refuse_given_motion(scenario)
-    train = scenario.train()
+    shown, train = shown_motion(rig), scenario.train()
     if coupling := next((key for key, _ in train.couplings()), None):
         raise InputError(f"no channel shows the state of {coupling}")
     for name, gear in train.gears.items():
         if not isinstance(gear.stiffness, Rigid):
             raise InputError(f"no channel shows the twist of gears.{name}")
-    for kind in ("angle", "speed")[: 1 if depends_on_angle(train) else 2]:
-        for name, m in rig.task.measured.items():
-            by_variable = {
-                train.variable(s, "angle") if kind == "angle" else train.variable(s, "speed"): s for s in train.shafts
-            }
-            shaft = by_variable.get(m.variable)
-            if shaft is None or numbers_of(m, known)["filter_time"] > 0.0:
-                continue
-            ratios = {s: turns(train, s, shaft) for s in train.shafts}
-            whole = {s: n for s, n in ratios.items() if n is not None}
-            if len(whole) == len(ratios):
-                keys = {s: {key: scenario.initial_key(key, s) for key in ("angles", "speeds")} for s in train.shafts}
-                return Restart(name, shaft, kind == "speed", whole, keys)
-    raise InputError("no measured channel without a filter shows the angle of a shaft with which all others turn")
+    ratios = {s: n for s in train.shafts if (n := turns(train, s, shown.shaft)) is not None}
+    if apart := train.shafts.keys() - ratios.keys():
+        raise InputError(
+            f"shaft {min(apart)} does not turn with {shown.shaft}, which the channel {shown.channel} shows"
+        )
+    keys = {s: {key: scenario.initial_key(key, s) for key in ("angles", "speeds")} for s in train.shafts}
+    return Restart(shown.channel, shown.shaft, shown.is_speed, ratios, keys)
 
 
 def _up_to_first_pause(log: Prepared, begins: list[int], ends: list[int], why: str) -> Prepared:

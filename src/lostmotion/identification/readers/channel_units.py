@@ -10,11 +10,6 @@ from ...units.conversion import si_factor, si_value
 KINDS = ("rad", "rad/s", "N*m", "A", "V", "N", "m", "m/s", "s", "K", "rad/s^2", "m/s^2", "W", "Pa")
 
 
-def channel_factor(written: str, of_file: str, unit: str, where: str) -> float:
-    """Factor from the unit of a channel to SI; see `channel_unit`."""
-    return channel_unit(written, of_file, unit, where)[0]
-
-
 def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[float, str]:
     """(what one of the unit of a channel is in SI, the SI unit).
 
@@ -42,7 +37,7 @@ def channel_unit(written: str, of_file: str, unit: str, where: str) -> tuple[flo
 def is_unit(text: str) -> bool:
     """Whether a text is a unit of a channel."""
     try:
-        channel_factor(text, "", "", "")
+        channel_unit(text, "", "", "")
     except InputError:
         return False
     return True

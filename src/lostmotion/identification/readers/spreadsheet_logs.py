@@ -52,12 +52,13 @@ def _of_book(book: Any, clock: str) -> Log:
     for sheet in book.worksheets:
         sheet.reset_dimensions()  # what a file announces need not be so
         comments: list[str] = []
-        rows = _rows(sheet, comments)
-        first = next(rows, None)
-        if first is None:
+        rows = list(_rows(sheet, comments))
+        if not rows:
             continue
+        width = len(rows[0][1])  # cells that a sheet does not hold are empty
+        rows = [(number, [*cells, *[None] * (width - len(cells))]) for number, cells in rows]
         try:
-            log = _table([*_chained(first, rows)], comments, clock)
+            log = _table(rows, comments, clock)
         except UnreadError as problem:
             raise InputError(f"sheet {sheet.title}, row {problem.row}: {problem}") from None
         others = [s.title for s in book.worksheets if s is not sheet]
@@ -75,14 +76,6 @@ def _table(rows: list[TableRow], comments: list[str], time: str) -> Log:
             return odd_table_log(rows, _number, comments, time)[1]
         except UnreadError:
             raise problem from None
-
-
-def _chained(first: TableRow, rows: Iterator[TableRow]) -> Iterator[TableRow]:
-    """Rows of the length of the first: cells that a sheet does not hold are empty."""
-    width = len(first[1])
-    yield first
-    for number, cells in rows:
-        yield number, [*cells, *[None] * (width - len(cells))]
 
 
 def _rows(sheet: Any, comments: list[str]) -> Iterator[TableRow]:

@@ -47,14 +47,7 @@ NAMED_FACTORS = {
 
 @dataclass(frozen=True)
 class OddLog:
-    """A log that disagrees with the others.
-
-    Examples
-    --------
-    >>> from lostmotion.identification.verdicts.disagreeing_logs import OddLog
-    >>> print(OddLog("7.csv", "angle", "rad", 0.5, 250.0, "angle has the opposite sign", 0.002, held_out=False).text)
-    7.csv: angle: residuals of 28.6 deg are 250 times those of the other logs; angle has the opposite sign: with that undone 0.115 deg
-    """
+    """A log that disagrees with the others."""
 
     log: str  # name of the log
     channel: str  # measured channel with the largest residuals

@@ -36,15 +36,7 @@ MODEL = (" ms late", " ms early", "clock runs", "has an offset")  # faults that 
 
 @dataclass(frozen=True)
 class SharedFault:
-    """A fault of several logs, taken to be the model's.
-
-    Examples
-    --------
-    >>> from lostmotion.identification.verdicts.shared_faults import SharedFault
-    >>> print(SharedFault(("1.csv", "4.csv"), 9, "the inputs are 30 to 60 ms late", "steps = 1 (2 of 2 such logs)", "").text)
-    2 of 9 logs (1.csv, 4.csv): the inputs are 30 to 60 ms late; in common: steps = 1 (2 of 2 such logs); a fault that logs
-    share is the model's, so that they stay in the fit
-    """
+    """A fault of several logs, taken to be the model's."""
 
     logs: tuple[str, ...]  #: names
     total: int  #: number of all logs
