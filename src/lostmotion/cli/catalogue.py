@@ -1,7 +1,5 @@
 """`lostmotion catalogue`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .arguments import argument, flag, option

@@ -1,7 +1,5 @@
 """`lostmotion check`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .arguments import Overrides, SourceArgument, again, load_scenario, option

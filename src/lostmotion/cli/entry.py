@@ -1,7 +1,5 @@
 """The application: its commands, and how each way of failing ends."""
 
-from __future__ import annotations
-
 import gc
 import os
 import re

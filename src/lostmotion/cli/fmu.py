@@ -1,7 +1,5 @@
 """`lostmotion fmu`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .arguments import Overrides, SourceArgument, flag, load_scenario, option

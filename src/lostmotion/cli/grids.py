@@ -1,7 +1,5 @@
 """Lists of values on the command line."""
 
-from __future__ import annotations
-
 import itertools
 import re
 

@@ -1,7 +1,5 @@
 """`lostmotion live`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .arguments import Overrides, SourceArgument, again, flag, load_scenario, option

@@ -1,7 +1,5 @@
 """`lostmotion monitor`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import typer

@@ -1,7 +1,5 @@
 """`lostmotion reproduce`."""
 
-from __future__ import annotations
-
 from .arguments import FiguresOption, ReportOption
 from .targets import pictures_of, writing
 from .terminal import progress

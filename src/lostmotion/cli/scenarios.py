@@ -1,7 +1,5 @@
 """`lostmotion scenarios`, `lostmotion new` and `lostmotion schema`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from .arguments import SourceArgument, option

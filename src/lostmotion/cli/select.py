@@ -1,7 +1,5 @@
 """`lostmotion select`."""
 
-from __future__ import annotations
-
 from .arguments import argument
 from .study import OutputOption, ProcessesOption, SchedulerOption, ThreadsOption, compute, print_outcome, runs_directory
 

@@ -1,7 +1,5 @@
 """`lostmotion steps`."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from ..errors import InputError

@@ -1,7 +1,5 @@
 """Files and directories that commands write to: tried before the work, and what goes wrong as one line."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Records of the catalogue at any place of a drive train."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping
 from typing import Any
 

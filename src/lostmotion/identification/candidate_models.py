@@ -3,8 +3,6 @@
 A rung is the index of a candidate model in the `ladder` of the file. Each has the free parameters of those before and more.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -1,7 +1,5 @@
 """Errors of logs under a condition that the fit has not seen: the model is fitted again without them, one condition after the other."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace

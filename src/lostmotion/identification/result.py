@@ -1,7 +1,5 @@
 """The answer of an identification: values, intervals, errors, and what limits their use."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """The answer as files that are loadable everywhere: the identified rig as a scenario, and its gear as a data sheet."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..data_sheets.gearbox_sheet import GearboxSheet

@@ -1,7 +1,5 @@
 """Logs of a virtual rig: what an axis with given values would show, with noise and quantisation."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Checks of the arguments of public functions by their annotations: any wrong object ends in one `InputError`."""
 
-from __future__ import annotations
-
 import inspect
 import sys
 from collections.abc import Callable, Collection, Iterable, Mapping, Sized

@@ -1,7 +1,5 @@
 """Breakpoints of piecewise-linear laws."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Sequence
 

@@ -1,7 +1,5 @@
 """Values derived from an immutable part, made once and kept with the part."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import wraps
 from typing import Any, Protocol, TypeVar

@@ -1,7 +1,5 @@
 """Representation of parts: as one line of text, and as HTML in notebooks."""
 
-from __future__ import annotations
-
 import html
 from typing import Any
 

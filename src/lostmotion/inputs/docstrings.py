@@ -1,7 +1,5 @@
 """The docstrings of fields: below them in the source, or behind ``#:`` on their line."""
 
-from __future__ import annotations
-
 import ast
 import inspect
 import itertools

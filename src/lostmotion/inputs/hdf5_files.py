@@ -1,7 +1,5 @@
 """Resources that an HDF5 file requires of its reader, checked before any data are read."""
 
-from __future__ import annotations
-
 import zlib
 from pathlib import Path
 from typing import Any

@@ -1,7 +1,5 @@
 """Bare numbers that no drive has, mostly since another unit was meant: a warning names the unit in which they are read."""
 
-from __future__ import annotations
-
 import math
 import re
 import warnings

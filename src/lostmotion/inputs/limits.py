@@ -1,7 +1,5 @@
 """Limits of the memory that input files may need, checked before the memory is taken."""
 
-from __future__ import annotations
-
 import math
 import os
 import re

@@ -1,7 +1,5 @@
 """Elements by name, as the tables of a file have them: in the order given, and immutable."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping
 from typing import Annotated, Any, NoReturn, TypeVar

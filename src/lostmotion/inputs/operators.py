@@ -1,7 +1,5 @@
 """Expressions and formulas in files: their syntax trees, and the operators that they may use."""
 
-from __future__ import annotations
-
 import ast
 import operator
 import warnings

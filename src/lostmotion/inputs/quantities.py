@@ -1,7 +1,5 @@
 """Types of the fields of parts: SI numbers that may be written as strings with a unit."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated, Any

@@ -1,7 +1,5 @@
 """The JSON Schema of parts: what stands at a place in it, and in which unit."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Reading TOML files: every way in which one cannot be read ends in one clear line."""
 
-from __future__ import annotations
-
 import difflib
 import os
 import re

@@ -1,7 +1,5 @@
 """TOML files that are written."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

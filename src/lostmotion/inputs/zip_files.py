@@ -1,7 +1,5 @@
 """Resources that a ZIP archive requires of its reader, checked before any file is decompressed."""
 
-from __future__ import annotations
-
 import zipfile
 
 from ..errors import InputError

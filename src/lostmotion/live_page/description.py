@@ -1,7 +1,5 @@
 """A scenario as the page takes it: what its core runs, what it draws, and what can be changed."""
 
-from __future__ import annotations
-
 import base64
 from collections.abc import Iterator
 from typing import Any

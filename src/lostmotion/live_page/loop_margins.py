@@ -1,7 +1,5 @@
 """Margins of the loops of controllers, as the page shows them."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

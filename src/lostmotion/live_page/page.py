@@ -1,7 +1,5 @@
 """The page of a scenario: one HTML file with the core inside."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

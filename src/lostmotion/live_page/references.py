@@ -1,7 +1,5 @@
 """References of sampled controllers, as the page takes and changes them."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Drawing of a scenario on the page: its elements with the names of their variables, as page/src/description.ts describes them."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..control.controller import Controller

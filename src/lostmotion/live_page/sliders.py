@@ -1,7 +1,5 @@
 """Sliders of the page: values of a scenario with unit and range."""
 
-from __future__ import annotations
-
 import math
 import re
 from collections import Counter

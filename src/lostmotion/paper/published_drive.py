@@ -6,8 +6,6 @@ continues Čech and Jevický (2005). Equations and figures are numbered as there
 about it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """The report of `lostmotion reproduce`: one self-contained HTML file."""
 
-from __future__ import annotations
-
 import re
 
 from ..reports.page import cards, document, verdict

@@ -1,7 +1,5 @@
 """The paper reproduced: its figures, their data, its constants, and a report."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 from pathlib import Path
 

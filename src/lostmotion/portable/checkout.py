@@ -1,7 +1,5 @@
 """Libraries that a checkout compiles when they are first needed."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

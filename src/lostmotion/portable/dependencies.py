@@ -1,7 +1,5 @@
 """Structure of the equations of an FMU: inputs and states on which outputs and derivatives depend at once, in any regime."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Iterator, Mapping
 
 from ..model.train import COUPLINGS, ON_SHAFTS, DriveTrain

@@ -1,7 +1,5 @@
 """Formulas by which the numbers of a scenario follow from the values in its file; the core computes them without Python."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass

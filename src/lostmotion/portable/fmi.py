@@ -1,7 +1,5 @@
 """modelDescription.xml of FMI 2.0 and FMI 3.0, and the terminals and icon of FMI 3.0."""
 
-from __future__ import annotations
-
 from itertools import repeat
 from xml.etree import ElementTree as ET
 

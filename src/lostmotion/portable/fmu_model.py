@@ -1,7 +1,5 @@
 """Declarations of an FMU, for all versions of the standard, and its page."""
 
-from __future__ import annotations
-
 import html
 import math
 import zlib

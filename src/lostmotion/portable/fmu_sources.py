@@ -1,7 +1,5 @@
 """The directory sources/ of an FMU, for tools and targets that compile FMUs themselves."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from xml.etree import ElementTree as ET

@@ -1,7 +1,5 @@
 """Measurements of the rig beside the values of the data sheet."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

@@ -1,7 +1,5 @@
 """Readings of slow loadings and of ramps until something breaks loose, of gearboxes and screws alike."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Any
 

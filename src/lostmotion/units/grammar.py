@@ -1,7 +1,5 @@
 """The units that may be written, and how products of them are read: a closed list, so that no prefix is guessed."""
 
-from __future__ import annotations
-
 import difflib
 import re
 import unicodedata

@@ -1,7 +1,5 @@
 """Practical units: those in which this trade prints speeds, angles and inertias. Inside the package everything is SI."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

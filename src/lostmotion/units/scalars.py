@@ -1,7 +1,5 @@
 """One rule for the numbers of every library: what is one number in NumPy or xarray is read as that number."""
 
-from __future__ import annotations
-
 import math
 import re
 import sys

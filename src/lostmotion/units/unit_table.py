@@ -1,7 +1,5 @@
 """The units of the grammar in SI. Prefixes are left out; the tests compare all units with a unit library."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from decimal import Decimal
 from functools import cache

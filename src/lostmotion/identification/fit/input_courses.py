@@ -1,7 +1,5 @@
 """Course of an input between two samples: held or linear, by the way in which its channel was recorded."""
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """Intervals of identified values: by a block bootstrap, and by the profile of the likelihood."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

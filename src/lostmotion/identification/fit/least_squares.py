@@ -1,7 +1,5 @@
 """Least squares over many logs: Levenberg-Marquardt with a robust loss, bounds, priors, and nuisances of each log."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field

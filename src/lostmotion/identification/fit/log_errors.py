@@ -1,7 +1,5 @@
 """Errors of runs against logs: MAE, RMSE and fit of each."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 

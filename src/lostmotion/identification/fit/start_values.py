@@ -4,8 +4,6 @@ The missing torque is linear in what enters linearly through the formulas of `se
 least squares over measured motions need no run, and no start values that are near.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 

@@ -1,7 +1,5 @@
 """Trend of each watched value over the estimates of logs: changes, present values, limits."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Logs as the fit takes them: channels in SI, what the formulas may name, phases, and which logs are held out."""
 
-from __future__ import annotations
-
 import itertools
 import re
 from collections.abc import Mapping

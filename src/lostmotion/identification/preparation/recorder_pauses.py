@@ -4,8 +4,6 @@ What acts during a pause is not known, so no run may lead through it. Behind it 
 follow from a cubic through the first samples. They are fitted with the parameters, as two values that the log has of its own.
 """
 
-from __future__ import annotations
-
 import copy
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

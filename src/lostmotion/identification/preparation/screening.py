@@ -1,7 +1,5 @@
 """Screening of logs: what cannot be used is dropped or refused, and what looks wrong is noted, each with its reason."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Iterable, Sequence
 from dataclasses import replace

@@ -1,7 +1,5 @@
 """The logs of a task: the usable logs, and the reasons why the others are not usable."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path

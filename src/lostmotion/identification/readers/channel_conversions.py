@@ -1,7 +1,5 @@
 """Formulas that measurement files carry for their channels: by the grammar of identification files, with ufuncs of NumPy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Units of channels, and their factors to SI."""
 
-from __future__ import annotations
-
 from contextlib import suppress
 
 from ...errors import InputError

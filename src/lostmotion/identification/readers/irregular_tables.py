@@ -5,8 +5,6 @@ channel, its time and its values. Above them are lines of `key value key value`,
 cut off and a cell such as `ERROR` cost only themselves, as long as they are few.
 """
 
-from __future__ import annotations
-
 import re
 from collections import Counter
 from collections.abc import Callable, Sequence

@@ -1,7 +1,5 @@
 """Tables of rows and columns, of text files and spreadsheets: headings, units, the column of the time, the log that they make."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import re

@@ -3,8 +3,6 @@
 Layout: ASAM MDF 4.2, block header of 24 bytes (id, length, number of links), links of 8 bytes, then data.
 """
 
-from __future__ import annotations
-
 import struct
 import zlib
 from collections.abc import Iterator

@@ -1,7 +1,5 @@
 """Logs in the formats of measuring tools: MATLAB, HDF5, Parquet, MDF 4, TDMS, each read by its library."""
 
-from __future__ import annotations
-
 import io
 import math
 import struct

@@ -1,7 +1,5 @@
 """Logs of NumPy: one array (NPY) or several (NPZ); nothing is unpickled."""
 
-from __future__ import annotations
-
 import math
 import zipfile
 from pathlib import Path

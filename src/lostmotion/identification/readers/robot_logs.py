@@ -1,7 +1,5 @@
 """Logs of robots: messages of topics, in MCAP files (JSON, ROS 1, ROS 2) and in bags of ROS 1 and ROS 2."""
 
-from __future__ import annotations
-
 import bz2
 import json
 import re

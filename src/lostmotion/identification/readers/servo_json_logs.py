@@ -1,7 +1,5 @@
 """JSON logs of servo recorders: a header, and `entries` with a `timestamp` each (the layout of BAM), or an array for each channel."""
 
-from __future__ import annotations
-
 import json
 import sys
 from pathlib import Path

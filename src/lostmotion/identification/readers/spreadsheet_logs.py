@@ -1,7 +1,5 @@
 """Logs in spreadsheets (XLSX): the values of one sheet; no formula is evaluated."""
 
-from __future__ import annotations
-
 import warnings
 import zipfile
 from collections.abc import Iterator

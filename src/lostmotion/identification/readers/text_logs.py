@@ -1,7 +1,5 @@
 """Logs in text: columns separated by commas, semicolons, tabs or spaces, with decimal points or decimal commas."""
 
-from __future__ import annotations
-
 import csv
 import itertools
 import re

@@ -7,8 +7,6 @@ All shafts turn with the measured one by fixed ratios n, so that with its speed 
 over shafts, with the motors' torques T and those over the angle M. At the right values r is 0 but for noise.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Inputs in a part of a log: inputs of the train, and references of sampled controllers."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """The measured motion of a rig: which shaft a log shows, its angle or speed, and the derivatives by local cubics."""
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

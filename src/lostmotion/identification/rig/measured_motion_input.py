@@ -1,7 +1,5 @@
 """Measured motion as an input: the speed of a shaft from a channel of its speed or its angle, without jumps."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from ...errors import InputError

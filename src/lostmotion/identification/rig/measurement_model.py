@@ -1,7 +1,5 @@
 """The measurement model: what the channels of a log show of a run, and how that changes with parameters."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Runs of all logs, and how they change with the parameters: exactly, and by differences where that is not defined."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

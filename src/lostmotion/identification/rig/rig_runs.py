@@ -3,8 +3,6 @@
 A log of several phases is run phase by phase; the state and its derivatives go on from one to the next.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

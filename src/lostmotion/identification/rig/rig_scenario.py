@@ -1,7 +1,5 @@
 """The rig: the scenario that a log and values of the parameters make."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Scenarios that differ in a few numbers, made without checking again what does not differ."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from functools import cache
 from typing import Any, get_args, get_origin

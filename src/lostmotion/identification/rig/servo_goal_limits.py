@@ -4,8 +4,6 @@ The goal does not depend on the motion, so its course is computed beforehand. Th
 the log, with straight lines between its points.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

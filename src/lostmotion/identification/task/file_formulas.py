@@ -1,7 +1,5 @@
 """Formulas of identification files: arithmetic of parameters and of what is known of a log, by a grammar of their own."""
 
-from __future__ import annotations
-
 import ast
 import math
 from collections.abc import Callable, Mapping

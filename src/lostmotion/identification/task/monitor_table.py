@@ -1,7 +1,5 @@
 """The table ``monitor`` of an identification file: what is watched over the life of a drive, and when it is an alarm."""
 
-from __future__ import annotations
-
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator

@@ -6,8 +6,6 @@ channels. A fault explains a log if undoing it brings its residuals down to the 
 left out of the fit; one that no fault explains stays in it, since the model may be what is wrong.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,7 +1,5 @@
 """Unidentifiable parameters in words: the null directions of the scaled Jacobian."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 

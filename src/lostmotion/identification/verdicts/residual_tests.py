@@ -1,7 +1,5 @@
 """Whether residuals are noise: their size against the stated deviation, their runs, their correlation and their shape."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

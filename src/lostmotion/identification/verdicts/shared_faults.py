@@ -5,8 +5,6 @@ an effect that the model lacks. For example, a firmware that limits the rate of 
 large steps. Such logs stay in the fit.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Callable, Iterator, Sequence

@@ -1,7 +1,5 @@
 """Remedies for unidentifiable parameters: experiments that the rig can run, and channels that are missing."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from ..rig.rig_scenario import Rig

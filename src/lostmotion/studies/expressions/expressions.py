@@ -4,8 +4,6 @@ An expression is parsed, and each of its parts turned into an entry of the table
 the listed ones is refused. The text is never run as Python.
 """
 
-from __future__ import annotations
-
 import ast
 import operator
 from collections.abc import Callable, Mapping

@@ -3,8 +3,6 @@
 Nothing else can be called: an expression is read into entries of these tables, never run as Python.
 """
 
-from __future__ import annotations
-
 import warnings
 from collections.abc import Callable
 from typing import Any, Literal, NamedTuple

@@ -1,7 +1,5 @@
 """Properties of a value in a study's expression before any run: its unit, and whether it has a value for each instant."""
 
-from __future__ import annotations
-
 import re
 from typing import NamedTuple
 

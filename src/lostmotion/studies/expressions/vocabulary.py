@@ -1,7 +1,5 @@
 """Names in the expressions of a study: the result variables and energies of its base scenario, and further values of a run."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from typing import NamedTuple
 

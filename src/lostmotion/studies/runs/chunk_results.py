@@ -1,7 +1,5 @@
 """Results of the runs of a chunk of a study."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs of trains without sampled controllers: all in one call of the core, which writes plain numbers that vary into the train."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Runs under sampled controllers, and of trains of several parts: each by itself."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

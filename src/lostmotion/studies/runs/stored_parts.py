@@ -1,7 +1,5 @@
 """Parts of the directory of a study: their names, their checksums, and what is wrong with them."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Nearest misses: candidates that almost fit, what each lacks, and how much slower the cycle would have to be."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from dataclasses import dataclass, replace

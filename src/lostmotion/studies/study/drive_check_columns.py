@@ -1,7 +1,5 @@
 """The drive check of each run of a study, as columns of its table."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping
 

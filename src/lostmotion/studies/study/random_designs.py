@@ -1,7 +1,5 @@
 """Random and quasi-random designs of studies: points of the unit cube; any part can be made by itself."""
 
-from __future__ import annotations
-
 import warnings
 from functools import lru_cache
 

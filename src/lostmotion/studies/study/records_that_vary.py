@@ -1,7 +1,5 @@
 """Records of the catalogue as what a study varies: which keys take names, and which records fit a filter."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from fnmatch import fnmatchcase

@@ -1,7 +1,5 @@
 """Steppers as candidates of a task. The base of a task has a controller, which a stepper cannot have: they are made apart."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Keys of a task that may vary and are none of motor and gearbox: of the load or the slide, the last stage, controller and task."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from copy import deepcopy
 from typing import Any

@@ -1,7 +1,5 @@
 """Values that a study takes from its runs: result variables, reductions of them, energies, the drive check."""
 
-from __future__ import annotations
-
 from .study import Study
 
 
