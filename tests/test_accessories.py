@@ -117,9 +117,8 @@ def test_the_brake_of_the_motor():
     assert study.part("motor", np.array([0.0])).rotor_inertia == pytest.approx(2.0e-4 + 2.5e-5)
     held = 2.0 * G * 0.2 * math.sin(1.0) / 20.0
     assert 7.84 * rules(study)["holding_brake"].use == pytest.approx(held, rel=1e-9)
-    lacking = Axes(study).judged(study.parameters(1, 2)[0])
-    assert isinstance(lacking, lm.InputError)
-    assert '"yaskawa-sgmsh-10aa": the catalogue has no brake of this motor' in str(lacking)
+    with pytest.raises(lm.InputError, match='"yaskawa-sgmsh-10aa": the catalogue has no brake of this motor'):
+        Axes(study).judged(study.parameters(1, 2)[0])
 
 
 @pytest.mark.parametrize("brake", ["yaskawa-sgmah-02-brake", {"from": "yaskawa-sgmah-02-brake", "torque": "0.1 N m"}])

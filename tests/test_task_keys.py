@@ -122,7 +122,10 @@ def findings_of(tables: dict[str, Any], rule: str | None = None) -> Any:
 
 
 def judged(form: str, **task: Any) -> list[Any] | lm.InputError:
-    return findings_of(changed(form, task=task))
+    try:
+        return findings_of(changed(form, task=task))
+    except lm.InputError as error:
+        return error
 
 
 def texts(findings: list[Any] | lm.InputError) -> set[tuple[str, ...]]:

@@ -199,13 +199,7 @@ class GearboxSheet(GearboxLoads, Record):
 
     def limits(self) -> GearboxLimits:
         """Limits for the drive check."""
-        return GearboxLimits(
-            average_output_torque=self.average_output_torque,
-            peak_output_torque=self.peak_output_torque,
-            momentary_output_torque=self.momentary_output_torque,
-            average_input_speed=self.average_input_speed,
-            max_input_speed=self.max_input_speed,
-        )
+        return GearboxLimits.like(self)
 
     def scalars(self) -> dict[str, Any]:
         """Keys of `[gearbox]` that the sheet has too."""

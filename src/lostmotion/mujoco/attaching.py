@@ -55,8 +55,6 @@ def alone_on_joint(
     """The same, with what robot and drive both have taken off one of them.
 
     put: whether the robot is on a device already, so that nothing can be taken off it.
-
-    Raises InputError: there is such a thing, and it is not to be replaced.
     """
     heavy = (robot.body_mass > 0.0) & (robot.body_gravcomp != 1.0)
     weighs = bool(robot.opt.gravity.any() and heavy.any()) and acts(robot, "GRAVITY")

@@ -48,14 +48,11 @@ UNLIMITED = (-math.inf, math.inf)
 class JointActuator:
     """A drive as the actuator of a joint, with the control of an actuator in MuJoCo. `from_mjcf` returns it, `attach` takes it."""
 
-    drive: Driven
-    """drive of the joint, with its controller if the actuator is a servo"""
+    drive: Driven  #: drive of the joint, with its controller if the actuator is a servo
     scale: float = 1.0
     """from the control to what the drive is given: the torque of its motor [N·m], or the reference of its controller [rad, rad/s]"""
-    lower: float = -math.inf
-    """least control; a smaller one counts as this one"""
-    upper: float = math.inf
-    """greatest control"""
+    lower: float = -math.inf  #: least control; a smaller one counts as this one
+    upper: float = math.inf  #: greatest control
 
     def given(self, control: float) -> float:
         """Command or reference of the drive for a control."""
@@ -176,10 +173,7 @@ def _of_joint(model: mujoco.MjModel, number: int, ratio: float | None) -> Drive 
 
 
 def _law(model: mujoco.MjModel, k: int) -> _Law:
-    """The law of an actuator on a joint.
-
-    Raises InputError: it has another one, or an attribute that is not taken over.
-    """
+    """The law of an actuator on a joint."""
     import mujoco
 
     def refuse(attribute: str, value: Any) -> InputError:

@@ -28,8 +28,6 @@ def without_weight(name: str, drive: Scenario, *, replace: bool, weighs: bool) -
     name: of the joint.
     replace: whether to take them off the drive.
     weighs: whether gravity acts in the robot.
-
-    Raises InputError: the drive has such, and it is not to be replaced.
     """
     inclined = inclinations_of(drive)
     weights = weights_of(name, drive) if weighs else []
@@ -103,8 +101,6 @@ def clear(model: mujoco.MjModel, name: str, drive: Scenario, *, replace: bool, p
     """Remove MuJoCo's own description of the drive of a joint.
 
     put: whether the model is on a device already, where nothing can be removed.
-
-    Raises InputError: there is such a thing, and it is not to be replaced or cannot be.
     """
     import mujoco
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -63,6 +63,7 @@ HOLDS = "holds from the least to the largest losses of its kind"
 """verdict on a gearbox with estimated losses that none of them turns"""
 
 ResultRow = dict[str, Any]
+T = TypeVar("T")
 
 
 @dataclass
@@ -81,26 +82,25 @@ class Axes:
         """One cycle of the load of a row."""
         base, task = self.study.base_of(row), self.task
         of_coils = self.study.part_key("motor", row) if self.study.slides_itself(row) else ()
-        found = self._once(
-            ("motion", of_coils), lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise)
-        )
-        assert isinstance(found, RequiredMotion)
-        return found
+        key = ("motion", of_coils)
+        return self._once(key, lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise))
 
-    def _once(self, key: tuple[Any, ...], make: Callable[[], Any]) -> Any:
-        """Value that is made at most once; an error is kept as such."""
+    def _once(self, key: tuple[Any, ...], make: Callable[[], T]) -> T:
+        """Value that is made at most once, or the error in its place."""
         kept = self.study.kept
         if key not in kept:
             try:
                 kept[key] = make()
             except InputError as error:
                 kept[key] = error
-        return kept[key]
+        if isinstance(kept[key], InputError):
+            raise kept[key].with_traceback(None)
+        return kept[key]  # type: ignore[no-any-return]
 
-    def gearbox(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]] | InputError:
+    def gearbox(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]]:
         """Demands on the input of the gearbox, and the rules for it and for the stage behind it."""
         key = ("demand", self.study.part_key("gearbox", row), self._stage_key(row))
-        return self._once(key, lambda: self._demand(row))  # type: ignore[no-any-return]
+        return self._once(key, lambda: self._demand(row))
 
     def _stage_key(self, row: np.ndarray) -> Any:
         kind = self.task.stage_kind
@@ -110,10 +110,7 @@ class Axes:
         """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load."""
         if self.task.linear is None or self.study.slides_itself(row):
             return None
-        found = self._once(("stage motion", self._stage_key(row)), lambda: self._stage(row))
-        if isinstance(found, InputError):
-            raise found
-        return found  # type: ignore[no-any-return]
+        return self._once(("stage motion", self._stage_key(row)), lambda: self._stage(row))
 
     def _stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]]:
         stage: Stage = self.study.part("stage", row)
@@ -153,20 +150,22 @@ class Axes:
             found.append(without_part("gearbox_life", "gearbox or screw", "task.life"))
         return found
 
-    def motor(self, row: np.ndarray) -> Motor | InputError:
+    def motor(self, row: np.ndarray) -> Motor:
         """The motor of a row."""
         key = ("checked", *self.study.part_key("motor", row))
         return self._once(key, lambda: self.study.part("motor", row))  # type: ignore[no-any-return]
 
-    def judged(self, row: np.ndarray) -> list[Finding] | InputError:
-        """Findings for a pair before any run, or the error of a record that lacks data for a run."""
-        gearbox, motor = self.gearbox(row), self.motor(row)
-        errors = [error for error in (gearbox, motor) if isinstance(error, InputError)]
-        if errors:
-            return InputError(problems=list(dict.fromkeys(p for error in errors for p in error.problems)))
-        assert not isinstance(gearbox, InputError)
-        assert not isinstance(motor, InputError)
-        demand, findings = gearbox
+    def judged(self, row: np.ndarray) -> list[Finding]:
+        """Findings for a pair before any run. Raises InputError: its records lack data for a run."""
+        problems: list[Problem] = []
+        for part in (self.gearbox, self.motor):
+            try:
+                part(row)
+            except InputError as error:
+                problems += error.problems
+        if problems:
+            raise InputError(problems=list(dict.fromkeys(problems)))
+        (demand, findings), motor = self.gearbox(row), self.motor(row)
         findings, lacking = self._chosen(row, [*findings, *self._braked(row, demand)])
         known = motor.held_loss() if motor.kind == "stepper" else motor.copper_loss()
         if known is None and (needing := self._electrical()) is not None:
@@ -174,7 +173,7 @@ class Axes:
                 f"the sheet of the motor lacks its winding, which select for {needing} needs; take mechanical_energy"
             )
         if lacking:
-            return InputError(problems=[Problem((), text) for text in lacking])
+            raise InputError(problems=[Problem((), text) for text in lacking])
         task, load, slides = self.task, float(self.motion(row).inertia.max()), self.study.slides_itself(row)
         found = check_motor(
             demand,
@@ -234,20 +233,18 @@ class Axes:
     def _without_run(self, row: np.ndarray) -> ResultRow:
         """The columns that need no run."""
         known = {column: value for column, (value, _) in self.choice(row).items()}
-        gearbox, motor = self.gearbox(row), self.motor(row)
-        if isinstance(gearbox, InputError) or isinstance(motor, InputError):
+        try:
+            (demand, _), motor = self.gearbox(row), self.motor(row)
+        except InputError:
             return known
-        slides, torque = self.study.slides_itself(row), gearbox[0].motor_torque(motor)
+        slides, torque = self.study.slides_itself(row), demand.motor_torque(motor)
         required = f"required_{'force' if slides else 'torque'}"
         known |= {
             f"{required}_peak": float(np.abs(torque).max()),
-            f"{required}_rms": gearbox[0].cycle(torque).rms_motor_torque,
+            f"{required}_rms": demand.cycle(torque).rms_motor_torque,
         }
-        if slides:
-            return known
-        return known | {
-            "inertia_ratio": ratio_of_inertias(motor, gearbox[0].whole, float(self.motion(row).inertia.max()))
-        }
+        ratio = ratio_of_inertias(motor, demand.whole, float(self.motion(row).inertia.max()))
+        return known if slides else known | {"inertia_ratio": ratio}
 
     def _chosen(self, row: np.ndarray, findings: list[Finding]) -> tuple[list[Finding], list[str]]:
         """Findings with the findings on the limits of the choice, and the data that the records lack for limits and objectives."""
@@ -301,29 +298,33 @@ class Axes:
 
     def refused(self, row: np.ndarray) -> ResultRow | None:
         """The columns of a pair that the rules refuse; None if it is to be run."""
-        found = self.judged(row)
-        if isinstance(found, InputError):
-            lacking = BETWEEN.join(p.of_any_record() for p in found.problems)
-            return CHECKS | {"violated": NO_DATA, "why": str(found), MISSING: lacking}
+        try:
+            found = self.judged(row)
+        except InputError as error:
+            lacking = BETWEEN.join(p.of_any_record() for p in error.problems)
+            return CHECKS | {"violated": NO_DATA, "why": str(error), MISSING: lacking}
         if not any(f.verdict == "warning" for f in found):
             return None
         required = self._without_run(row)
         of_motor = {
             name.replace("required", "motor"): required[name] for name in required if name.startswith("required_")
         }
-        gearbox, motor = self.gearbox(row), self.motor(row)
-        if isinstance(gearbox, InputError) or isinstance(motor, InputError) or self.study.slides_itself(row):
-            return columns_of(found, CHECKS) | required | of_motor
-        of_gearbox = columns_of_gearbox(gearbox[0].cycle(gearbox[0].motor_torque(motor)))
-        return columns_of(found, CHECKS) | required | of_motor | of_gearbox
+        columns = columns_of(found, CHECKS) | required | of_motor
+        if self.study.slides_itself(row):
+            return columns
+        demand, _ = self.gearbox(row)
+        return columns | columns_of_gearbox(demand.cycle(demand.motor_torque(self.motor(row))))
 
     def verdict_at_ends(self, row: np.ndarray, own: tuple[str, ...]) -> str:
         """Verdict over the range of estimated losses; empty where the losses are printed.
 
         own: limits that the pair violates with the estimate itself.
         """
-        gearbox = self._once(("part", self.study.part_key("gearbox", row)), lambda: self.study.part("gearbox", row))
-        if isinstance(gearbox, InputError) or gearbox.loss_range is None:
+        try:
+            gearbox = self._once(("part", self.study.part_key("gearbox", row)), lambda: self.study.part("gearbox", row))
+        except InputError:
+            return ""
+        if gearbox.loss_range is None:
             return ""
         ends = [self._with_known_losses(row, factor).violated(row) for factor in gearbox.loss_range]
         if all(set(end) == set(own) for end in ends):
@@ -343,9 +344,7 @@ class Axes:
             study._kept = kept | {key: self.study.part("gearbox", row).with_losses(factor)}
             return Axes(study)
 
-        found = self._once(("known losses", key, factor), make)
-        assert isinstance(found, Axes)
-        return found
+        return self._once(("known losses", key, factor), make)
 
     def violated(self, row: np.ndarray) -> tuple[str, ...]:
         """Limits that a pair violates, of the rules and of the selection; the pair is run if the rules pass."""
@@ -420,9 +419,7 @@ class Axes:
             of_gearbox = [*loads(g, float(np.abs(duty.output_torque).max()), duty), *input_speeds(g, duty)]
         found = self._under_task([*of_gearbox, *of_motor], made.scenario.motor)
         again = {f.rule for f in found}
-        before = self.judged(row)
-        assert not isinstance(before, InputError)
-        return [*found, *(f for f in before if f.rule not in again)]
+        return [*found, *(f for f in self.judged(row) if f.rule not in again)]
 
 
 def run_axes(study: Study, parameters: np.ndarray, threads: int) -> Runs:
