@@ -304,6 +304,13 @@ def test_dry_friction_of_the_load_takes_no_gain_from_the_position_loop(position_
     assert wanted.gain == pytest.approx(lm.tune(position_axis, rule="margins", bandwidth="3 Hz").gain, rel=1e-4)
 
 
+@pytest.mark.parametrize("damping", [0.0, 5e3, 1e6])
+def test_friction_holds_a_slide_behind_a_damped_screw(damping: float) -> None:
+    """At a small enough speed of the motor the damping takes less than the friction, whatever the coefficient: the regime exists."""
+    axis = axis_of(lm.load("ball-screw-axis").replace(**{"axis.screw.damping": damping}))
+    assert [regime.name for regime in regimes(axis)] == ["gap", "stiffness", "load stuck"]
+
+
 def test_the_names_of_tuned_gains_are_those_of_the_file_in_every_form() -> None:
     for name in ("position-axis", "ball-screw-axis"):
         assert "controller.position.gain" in [key for key, _, _ in lm.tune(lm.load(name), rule="suited").changes()]

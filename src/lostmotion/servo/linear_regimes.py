@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 SLIP = (
     1e-6  # relative difference of the speeds at both ends of a gear with hysteresis, so that its twist does not stick
 )
+HELD = 0.45  # share of the friction of a stuck load that the damping of the mesh may take
 LOAD_STUCK = "load stuck"  # regime in which friction holds the load and the motor turns against the main gear
 BEYOND = 1.5  # times the last breakpoint: a twist in the last piece of a torsion curve
 
@@ -260,7 +261,12 @@ def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]
         )
     output = train.gears[main].output
     if train.shafts[output].friction_torque > 0.0:
-        held = {shaft: w for shaft, w in _speeds(axis, v, SLIP).items() if shaft not in (output, axis.shaft)}
+        turning = _speeds(axis, v, SLIP)
+        # So slowly that the damping of the mesh takes less than the friction leaves beside the spring.
+        gear = train.gears[main]
+        damping = abs(gear.mesh_damping * turning.get(gear.input, 0.0) / gear.ratio)
+        slowly = min(1.0, HELD * train.shafts[output].friction_torque / damping) if damping > 0.0 else 1.0
+        held = {shaft: slowly * w for shaft, w in turning.items() if shaft not in (output, axis.shaft)}
         near = edges[first] + min(
             0.5 * (edges[first + 1] - edges[first]), 0.5 * train.shafts[output].friction_torque / slopes[first]
         )
