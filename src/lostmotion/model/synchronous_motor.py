@@ -285,17 +285,17 @@ class Winding(Part):
         ratio = constants[high] / constants[low]
         if ratio <= 1.0 + AGREEMENT:
             return
-        per_ampere = {key: f"{1.5 * math.sqrt(2.0) * constants[key]:.4g} N·m to one ampere rms" for key in (low, high)}
+        per_ampere = [f"{1.5 * math.sqrt(2.0) * constants[key]:.4g}" for key in (low, high)]
         why = next(
             (
                 f" They differ by {factor:.3f}, {how}."
                 for factor, how in MISREADINGS.items()
                 if abs(ratio / factor - 1.0) < 0.02
             ),
-            " If both are printed so (hot magnets, saturation), leave out the one that you trust less.",
+            " If both are printed so (hot magnets, saturation), leave one out.",
         )
         raise ValueError(
-            f"has {low}, which makes {per_ampere[low]}, and {high}, which makes {per_ampere[high]}: {100 * (ratio - 1):.1f} % apart, "
+            f"has {low} and {high}, which make {' and '.join(per_ampere)} N·m to one ampere rms: {100 * (ratio - 1):.1f} % apart, "
             f"more than {100 * AGREEMENT:.0f} %.{why}"
         )
 
