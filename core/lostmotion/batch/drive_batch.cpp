@@ -1,6 +1,7 @@
 #include "drive_batch.hpp"
 
 #include <algorithm>
+#include <bit>
 #include <limits>
 #include <utility>
 
@@ -8,6 +9,21 @@
 #include "../simulation/train_control.hpp"
 
 namespace lostmotion::batch {
+
+namespace lanes {
+
+using real = double __attribute__((vector_size(4 * sizeof(double))));
+struct Lane {
+    using number = double;
+    using mask = decltype(real{} < real{});
+    static bool any(mask m) {
+        m |= __builtin_shufflevector(m, m, 2, 3, 0, 1);
+        return (m[0] | m[1]) != 0;
+    }
+};
+#include "drive_series.hpp"
+
+}  // namespace lanes
 
 namespace {
 
@@ -59,6 +75,60 @@ void each_number(const model::Assembly& a, int turned, MotionState& s, DriveStat
 
 }  // namespace
 
+// Walks of neighbouring drives, whose series are made at once.
+struct Lanes {
+    static constexpr std::size_t count = 4;
+    DriveWalk walks[count];
+
+    // Of each number of the walks, one lane.
+    lanes::real of(auto&& number) const {
+        return lanes::real{number(walks[0]), number(walks[1]), number(walks[2]), number(walks[3])};
+    }
+    lanes::DriveForm form(auto&& of_walk) const {
+        return {
+            of([&](const DriveWalk& w) { return of_walk(w).one; }),
+            of([&](const DriveWalk& w) { return of_walk(w).q; }), of([&](const DriveWalk& w) { return of_walk(w).a; }),
+            of([&](const DriveWalk& w) { return of_walk(w).v; }), of([&](const DriveWalk& w) { return of_walk(w).d; })};
+    }
+    // Moves those on by a time h whose regime is seen to last, all of which have entered theirs. Returns a bit of each.
+    unsigned move(double h, const DriveLaws& laws) {
+        const lanes::DriveRates r{form([](const DriveWalk& w) -> auto& { return w.r.q; }),
+                                  form([](const DriveWalk& w) -> auto& { return w.r.a; }),
+                                  form([](const DriveWalk& w) -> auto& { return w.r.w; }),
+                                  form([](const DriveWalk& w) -> auto& { return w.r.v; }),
+                                  of([](const DriveWalk& w) { return w.r.twists; }),
+                                  of([](const DriveWalk& w) { return w.r.norm; }),
+                                  of([](const DriveWalk& w) { return w.r.per_q; }),
+                                  of([](const DriveWalk& w) { return w.r.per_d; })};
+        lanes::DrivePoint x{of([](const DriveWalk& w) { return w.x.q; }), of([](const DriveWalk& w) { return w.x.a; }),
+                            of([](const DriveWalk& w) { return w.x.v; }), of([](const DriveWalk& w) { return w.x.d; })};
+        const lanes::real s = lanes::real{} + h;
+        lanes::Lane::mask lasts = r.norm * h <= laws.reach[laws.most_degree];
+        lanes::DriveSeries series;
+        series.expand(r, x, s, laws.reach, laws.inverse, laws.most_degree);
+        int guards = 0;
+        for (const DriveWalk& w : walks) guards = std::max(guards, w.r.n);
+        static constexpr DriveForm positive{1.0, 0.0, 0.0, 0.0, 0.0};
+        for (int g = 0; g < guards; ++g)
+            lasts &= lanes::DriveSeries::stays_positive(series.cubic(
+                form([g](const DriveWalk& w) -> auto& { return g < w.r.n ? w.r.guards[g].form : positive; })));
+        const lanes::real turned = series.move(s, lanes::real{} + 1.0, laws.inverse, x);
+        unsigned out = 0;
+        for (std::size_t i = 0; i < count; ++i) {
+            if (lasts[i] == 0) continue;
+            out |= 1u << i;
+            DriveState& to = walks[i].x;
+            to.q = x.q[i];
+            to.a = x.a[i];
+            to.v = x.v[i];
+            to.d = x.d[i];
+            to.angle += turned[i];
+            if (walks[i].rests()) walks[i].spare_at_rest(walks[i].r.pull.at(to));
+        }
+        return out;
+    }
+};
+
 // What a thread keeps: controllers, whose references change, and general solvers of some drives.
 struct DriveBatch::Worker {
     struct Kept {
@@ -69,6 +139,7 @@ struct DriveBatch::Worker {
     std::vector<control::Axis> laws;
     std::vector<Kept> solvers;
     long clock = 0;
+    int pause = 0, left_alone = 0;  // groups of drives whose series are not made at once
     Counts counts;
     Failure failure;
     MotionState state;  // its memory is used again
@@ -219,7 +290,10 @@ DriveBatch::Worker& DriveBatch::add_worker() {
 void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                             LoadAnswer* answers, Worker& worker) {
     DriveState from{};  // of a drive whose tangents are carried along
-    for (std::size_t k = begin; k < end; ++k) {
+    std::size_t k = begin;
+    if (!controlled() && answers == nullptr && slopes_.empty())
+        for (; k + Lanes::count <= end; k += Lanes::count) step_lanes(k, command, load_torque, worker);
+    for (; k < end; ++k) {
         ++worker.counts.steps;
         if (!slopes_.empty()) from = drives_[k];
         LoadAnswer* const answer = answers == nullptr ? nullptr : answers + k;
@@ -231,6 +305,36 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
         times_[k] += step_;
         inputs_[2 * k + 1] = load_torque[k];
         if (!slopes_.empty()) follow_tangents(k, from);
+        show(k);
+    }
+}
+
+void DriveBatch::step_lanes(std::size_t first, const Input& command, const Input& load_torque, Worker& worker) {
+    const auto walk = [&](std::size_t k) {
+        return DriveWalk(kind(k).laws(), numbers(k), drives_[k], command[k], load_torque[k]);
+    };
+    Lanes all{{walk(first), walk(first + 1), walk(first + 2), walk(first + 3)}};
+    bool well[Lanes::count], entered = true;
+    for (std::size_t i = 0; i < Lanes::count; ++i) entered &= well[i] = all.walks[i].enter();
+    // Series that are made in vain cost time: where few drives last, others of their kind are left alone for a while.
+    unsigned moved = 0;
+    if (entered && worker.left_alone == 0) {
+        moved = all.move(step_, kind(first).laws());
+        worker.pause = std::popcount(moved) > 1 ? 0 : std::min(2 * worker.pause + 1, 31);
+        worker.left_alone = worker.pause;
+    } else if (worker.left_alone > 0) {
+        --worker.left_alone;
+    }
+    for (std::size_t i = 0; i < Lanes::count; ++i) {
+        const std::size_t k = first + i;
+        DriveWalk& w = all.walks[i];
+        ++worker.counts.steps;
+        if ((moved >> i & 1u) != 0 || (well[i] && w.finish(step_)))
+            keep(k, w, command[k], worker);
+        else if (!solve(k, command[k], load_torque[k], nullptr, worker))
+            continue;
+        times_[k] += step_;
+        inputs_[2 * k + 1] = load_torque[k];
         show(k);
     }
 }

@@ -1,6 +1,7 @@
 // Many drives at once, all advanced by the same step, with inputs that are constant over it.
 //
-// Each drive is stepped by the walk of `drive_walk.hpp`, from one sample instant of its controller to the next.
+// Each drive is stepped by the walk of `drive_walk.hpp`, from one sample instant of its controller to the next. Where
+// there is no controller, the series of four neighbours are made at once; each lane has the bits that it has alone.
 // Whatever is not certain there is left to the general solver, which repeats the step from where it began. A drive does
 // not know of the others, so its bits do not depend on their number, on their order or on threads.
 #pragma once
@@ -106,6 +107,7 @@ class DriveBatch {
     Worker& add_worker();
     void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                     LoadAnswer* answers, Worker& worker);
+    void step_lanes(std::size_t first, const Input& command, const Input& load_torque, Worker& worker);
     bool walk(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker);
     void keep(std::size_t k, const DriveWalk& walk, double command, Worker& worker);
     bool walk_under_control(std::size_t k, double reference, double load_torque, Worker& worker);

@@ -9,6 +9,12 @@
 namespace lostmotion::batch {
 
 inline constexpr double ROUNDING = 0x1p-52;
+struct Lane {
+    using number = real;
+    using mask = bool;
+    static bool any(bool on) { return on; }
+};
+#include "drive_series.hpp"
 #include "drive_walk.hpp"
 
 // What drives of a kind share: their train, and its laws as the walk reads them.

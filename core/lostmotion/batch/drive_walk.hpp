@@ -24,7 +24,7 @@
 //
 // The text of this file is plain: it includes nothing, allocates nothing and calls nothing but what it defines, so that
 // it is also the body of a kernel for graphics processors. `real` is the type of its numbers, `ROUNDING` their
-// rounding; `parts/loss_grid.hpp` stands before it.
+// rounding; `parts/loss_grid.hpp` and `drive_series.hpp` stand before it.
 
 // What drives of a kind share.
 struct DriveLaws {
@@ -128,8 +128,8 @@ struct DriveSheet {
     }
 };
 
-struct DriveState {
-    real q, a, v, d, angle;
+struct DriveState : DrivePoint {
+    real angle;
     real hysteresis;                 // capacity [N m]
     real held;                       // torque of the mesh where all contacts rest, which the motion leaves open [N m]
     signed char motor, twist, load;  // modes of the contacts: 0 at rest, +1 or -1
@@ -138,40 +138,20 @@ struct DriveState {
     bool known;                      // the modes
 };
 
-struct DriveWalk {
+struct DriveWalk : Magnitudes {
     enum Verdict { yes, no, unsure };
     enum Kind { speed, capacity, piece, cell, back, flanks };
     enum Contact { motor, twist, load };
-    enum { longest_series = 24, most_guards = 16, most_switchings = 200, most_halvings = 60, longest_walk = 24 };
+    enum { most_guards = 16, most_switchings = 200, most_halvings = 60, longest_walk = 24 };
 
-    // one + q q + a a + v v + d d
-    struct Form {
-        real one, q, a, v, d;
-        real at(const DriveState& x) const { return one + (q * x.q + a * x.a) + (v * x.v + d * x.d); }
-        real size(const DriveState& x) const {
-            return magnitude(one) + magnitude(q * x.q) + magnitude(a * x.a) + magnitude(v * x.v) + magnitude(d * x.d);
-        }
-        bool varies() const { return q != 0 || a != 0 || v != 0 || d != 0; }
-        real along(const real* t) const { return (q * t[0] + a * t[1]) + (v * t[2] + d * t[3]); }
-        void add(real s, const Form& f) {
-            one += s * f.one;
-            q += s * f.q;
-            a += s * f.a;
-            v += s * f.v;
-            d += s * f.d;
-        }
-    };
+    typedef DriveForm Form;
     struct Guard {
         Form form;
         short kind, of, to;  // of: contact; to: what lies beyond
     };
-    struct Regime {
-        Form q, a, w, v;  // rates
-        bool twists;      // d' = v
-        Form output;      // T_2
-        Form pull;        // M
-        real norm;        // bound on the matrix of the rates, in scales that balance twist and speed, torque and speed
-        real per_q, per_d;  // these scales
+    struct Regime : DriveRates {
+        Form output;  // T_2
+        Form pull;    // M
         int n;
         Guard guards[most_guards];
     };
@@ -189,22 +169,18 @@ struct DriveWalk {
     real tangent[5], by_hysteresis;  // of q, a, v, d and the angle; of the capacity of the hysteresis
     DriveState x;
     Regime r;
-    int switchings, degree;
+    DriveSeries series;
+    int switchings;
     // What was not certain. `bold`: the walk goes on all the same, as if it were the likelier of both.
     enum Doubt { below_zero = 1, near_zero = 2, two_at_once = 4, too_long = 8, no_regime = 16 };
     bool bold;
     mutable int doubts;
-    real y[4][longest_series + 1];  // terms of the series of q, a, v, d, in the share of its time
-    real tail[4];                   // of the terms beyond the cubic
 
     // False: there is a doubt that the walk does not go on with.
     bool goes_on_with(int doubt) const {
         doubts |= doubt;
         return bold;
     }
-    static real magnitude(real v) { return v < 0 ? -v : v; }
-    static real least(real a, real b) { return a < b ? a : b; }
-    static real most(real a, real b) { return a > b ? a : b; }
     static bool is_single() { return ROUNDING > real(1e-10); }
     // The rounding of a value over the sum of the magnitudes of its terms, and where a guard begins on zero; the
     // distance below which two zeros coincide, in the time of the series.
@@ -222,7 +198,6 @@ struct DriveWalk {
           by_hysteresis(0),
           x(from),
           switchings(0),
-          degree(0),
           bold(false),
           doubts(0) {
         set_command(to_motor);
@@ -289,14 +264,20 @@ struct DriveWalk {
         }
     }
 
-    void guard(const Form& form, int kind, int of, int to) {
-        if (form.one == 0 && !form.varies()) return;  // as of a loss law whose load is zero in the gap: it ends nothing
+    // Numbers in registers: a form in memory would be waited for.
+    void guard(real one, real q, real a, real v, real d, int kind, int of, int to) {
+        if (one == 0 && q == 0 && a == 0 && v == 0 && d == 0) return;  // as of a loss law whose load is zero in the gap
         Guard& g = r.guards[r.n++];
-        g.form = form;
+        g.form.one = one;
+        g.form.q = q;
+        g.form.a = a;
+        g.form.v = v;
+        g.form.d = d;
         g.kind = static_cast<short>(kind);
         g.of = static_cast<short>(of);
         g.to = static_cast<short>(to);
     }
+    void guard(const Form& f, int kind, int of, int to) { guard(f.one, f.q, f.a, f.v, f.d, kind, of, to); }
     static Form over(const Form& f, real share, real one) {
         Form out = {one, 0, 0, 0, 0};
         out.add(share, f);
@@ -386,7 +367,7 @@ struct DriveWalk {
     // The regime of the modes, the piece and the cells. False: it is for the general solver.
     bool make() {
         r.n = 0;
-        r.twists = false;
+        r.twists = 0;
         const bool motor_at_rest = motor_rests(), load_at_rest = load_rests(), together = tied();
         if (rests()) {
             set_pull();
@@ -400,72 +381,67 @@ struct DriveWalk {
         if (motor_at_rest && load_at_rest && has(DriveNumbers::of_twist)) return false;
         if (together && (load_at_rest || (motor_at_rest && has(DriveNumbers::of_load)))) return false;
         set_pull();
-        // The torque T_2 of the mesh.
-        const int k = x.piece;
-        const Form P = laws.rigid ? Form{0, 0, 0, 0, 0} : Form{spring(k), 0, 0, 0, laws.slope[k]};
-        const bool damped = p.mesh_damping > 0 && !in_gap() && !(motor_at_rest && load_at_rest);
-        if (!together) {
-            r.output = P;
-            if (has(DriveNumbers::of_twist)) r.output.one += x.twist * x.hysteresis;
-            if (x.flanks == 1)
-                r.output = {0, 0, 0, 0, 0};
-            else if (x.flanks == 2)
-                r.output = over(P, 2, 0);
-            else if (damped)
-                r.output.v += p.mesh_damping;
+        // The torque T_2 of the mesh, and the rates, which stay in registers until they are complete.
+        const real at_zero = laws.rigid ? 0 : spring(x.piece), slope = laws.rigid ? 0 : laws.slope[x.piece];
+        Form output = {0, 0, 0, 0, 0}, a = output, w = output;
+        if (!together && x.flanks != 1) {
+            output.one = at_zero;
+            output.d = slope;
+            if (x.flanks == 2) {
+                output.one *= 2;
+                output.d *= 2;
+            } else {
+                if (has(DriveNumbers::of_twist)) output.one += x.twist * x.hysteresis;
+                if (p.mesh_damping > 0 && !in_gap() && !(motor_at_rest && load_at_rest)) output.v = p.mesh_damping;
+            }
         }
         // T_1 |i| = loss + share T_2 where the motor turns.
         const bool dry = has(DriveNumbers::dry_losses);
         real share = p.driving;
-        Form loss = {0, 0, 0, 0, 0};
+        // Torques on the motor and on the load, less those of the mesh.
+        Form to_motor = r.pull, to_load = {-load_torque, 0, -p.load_drag, together ? 0 : p.load_drag, 0};
+        if (has(DriveNumbers::of_motor)) to_motor.one -= x.motor * p.motor_slips;
+        if (has(DriveNumbers::of_load)) to_load.one -= x.load * p.load_slips;
+        to_motor.a -= p.motor_drag;
         if (dry && !motor_at_rest) {
             const Plane m = loss_plane(x.cell, false);
             share = 1 + m.per_load;
-            loss.one = x.motor * p.rated_torque * m.at_zero;
-            loss.a = p.rated_torque * p.speed_share * m.per_speed;
+            to_motor.one -= p.per_ratio * (x.motor * p.rated_torque * m.at_zero);
+            to_motor.a -= p.per_ratio * (p.rated_torque * p.speed_share * m.per_speed);
         }
-        const real motor_friction = has(DriveNumbers::of_motor) ? x.motor * p.motor_slips : 0;
-        const real load_friction = has(DriveNumbers::of_load) ? x.load * p.load_slips : 0;
-        Form to_motor = r.pull;  // torque on the motor less that of the mesh
-        to_motor.one -= motor_friction;
-        to_motor.a -= p.motor_drag;
-        to_motor.add(-p.per_ratio, loss);
-        Form to_load = {-load_torque - load_friction, 0, -p.load_drag, p.load_drag, 0};  // the same at the load
         if (together && motor_at_rest) {
-            r.output = {load_torque, 0, 0, 0, 0};
-            r.a = r.w = {0, 0, 0, 0, 0};
+            output.one = load_torque;
         } else if (together) {
-            to_load.v = 0;
             const real inertia = 1 / p.per_motor + share * p.per_ratio / p.per_load;
             if (!(inertia > 0)) return false;
-            r.a = over(to_motor, 1 / inertia, 0);
-            r.a.add(share * p.per_ratio / inertia, to_load);
-            r.w = r.a;
-            r.output = over(r.a, 1 / p.per_load, 0);
-            r.output.add(-1, to_load);
+            a.add(1 / inertia, to_motor);
+            a.add(share * p.per_ratio / inertia, to_load);
+            w = a;
+            output.add(1 / p.per_load, a);
+            output.add(-1, to_load);
         } else {
-            r.a = r.w = {0, 0, 0, 0, 0};
             if (!motor_at_rest) {
-                r.a = over(to_motor, p.per_motor, 0);
-                r.a.add(-p.per_motor * share * p.per_ratio, r.output);
+                a.add(p.per_motor, to_motor);
+                a.add(-p.per_motor * share * p.per_ratio, output);
             }
             if (!load_at_rest) {
-                r.w = over(to_load, p.per_load, 0);
-                r.w.add(p.per_load, r.output);
+                w.add(p.per_load, to_load);
+                w.add(p.per_load, output);
             }
-            r.twists = !(motor_at_rest && load_at_rest);
+            r.twists = motor_at_rest && load_at_rest ? 0 : 1;
         }
-        r.v = r.a;
-        r.v.add(-1, r.w);
-        if (together) r.v = {0, 0, 0, 0, 0};
+        r.output = output;
+        r.a = a;
+        r.w = w;
+        a.add(-1, w);
+        r.v = a;
         // Contacts that slip.
-        if (has(DriveNumbers::of_motor) && x.motor != 0)
-            guard({0, 0, static_cast<real>(x.motor), 0, 0}, speed, motor, 0);
+        if (has(DriveNumbers::of_motor) && x.motor != 0) guard(0, 0, x.motor, 0, 0, speed, motor, 0);
         if (has(DriveNumbers::of_twist) && x.twist != 0 && partner(twist) != motor)
-            guard({0, 0, 0, static_cast<real>(x.twist), 0}, speed, twist, 0);
+            guard(0, 0, 0, x.twist, 0, speed, twist, 0);
         if (has(DriveNumbers::of_load) && x.load != 0 && partner(load) < 0) {
             const real s = x.load;
-            guard({0, 0, s, -s, 0}, speed, load, 0);
+            guard(0, 0, s, -s, 0, speed, load, 0);
         }
         if (motor_at_rest) {  // T_1 |i| = share T_2 + standing where it begins to turn
             real forward = share, backward = share, standing = 0, standing_back = 0;
@@ -485,7 +461,8 @@ struct DriveWalk {
         }
         if (has(DriveNumbers::of_twist) && x.twist == 0) {
             Form held = r.output;
-            held.add(-1, P);
+            held.one -= at_zero;
+            held.d -= slope;
             guard(over(held, -1, x.hysteresis), capacity, twist, 1);
             guard(over(held, 1, x.hysteresis), capacity, twist, -1);
         }
@@ -493,26 +470,26 @@ struct DriveWalk {
             guard(over(r.output, -1, p.load_holds + load_torque), capacity, load, 1);
             guard(over(r.output, 1, p.load_holds - load_torque), capacity, load, -1);
         }
-        if (r.twists) add_pieces(P);
+        if (r.twists != 0) add_pieces(at_zero, slope);
         if (dry) add_cells(motor_at_rest);
         set_norm();
         return true;
     }
 
-    void add_pieces(const Form& P) {
+    // at_zero, slope: of the torque of the piece.
+    void add_pieces(real at_zero, real slope) {
         // An end that the twist slips away from is not reached.
         const int slip = has(DriveNumbers::of_twist) ? x.twist : 0;
-        if (x.piece + 1 < laws.pieces && slip >= 0) guard({upper(x.piece), 0, 0, 0, -1}, piece, 0, 1);
-        if (x.piece > 0 && slip <= 0) guard({-lower(x.piece), 0, 0, 0, 1}, piece, 0, -1);
+        if (x.piece + 1 < laws.pieces && slip >= 0) guard(upper(x.piece), 0, 0, 0, -1, piece, 0, 1);
+        if (x.piece > 0 && slip <= 0) guard(-lower(x.piece), 0, 0, 0, 1, piece, 0, -1);
         if (!laws.has_gap || !(p.mesh_damping > 0) || in_gap()) return;
-        const real way = x.piece > laws.zero ? 1 : -1;
-        Form pressed = over(P, way, 0), spare = pressed;
-        pressed.v += way * p.mesh_damping;
-        spare.v -= way * p.mesh_damping;
-        if (x.flanks == 1) return guard(over(pressed, -1, 0), flanks, 0, 0);
-        if (x.flanks == 2) return guard(over(spare, -1, 0), flanks, 0, 0);
-        guard(pressed, flanks, 0, 1);
-        if (laws.limits_damping) guard(spare, flanks, 0, 2);
+        const real way = x.piece > laws.zero ? 1 : -1, damping = way * p.mesh_damping;
+        at_zero *= way;
+        slope *= way;
+        if (x.flanks == 1) return guard(-at_zero, 0, 0, -damping, -slope, flanks, 0, 0);
+        if (x.flanks == 2) return guard(-at_zero, 0, 0, damping, -slope, flanks, 0, 0);
+        guard(at_zero, 0, 0, damping, slope, flanks, 0, 1);
+        if (laws.limits_damping) guard(at_zero, 0, 0, -damping, slope, flanks, 0, 2);
     }
 
     void add_cells(bool at_rest) {
@@ -551,7 +528,9 @@ struct DriveWalk {
     }
 
     // Advances by a time h. False: something is not certain; nothing of this walk may be used.
-    bool advance(real h) {
+    bool advance(real h) { return enter() && finish(h); }
+    // The regime under the inputs of the step.
+    bool enter() {
         if (!x.known) {
             if (!begin()) return false;
         } else {
@@ -561,7 +540,9 @@ struct DriveWalk {
             const Verdict v = verify(0, -1, true, violated);
             if (v == unsure || (v == no && !resolve(violated, true))) return false;
         }
-        real left = h;
+        return true;
+    }
+    bool finish(real left) {
         while (left > 0) {
             int fired = -1;
             if (!go_on(left, fired)) return false;
@@ -614,7 +595,7 @@ struct DriveWalk {
         for (bool fresh = true; left > 0; fresh = false) {
             const real longest = laws.reach[laws.most_degree];
             real s = r.norm * left > longest ? longest / r.norm : left;
-            expand(s);
+            series.expand(r, x, s, laws.reach, laws.inverse, laws.most_degree);
             Crossing first;
             while (true) {
                 bool halve = false;
@@ -624,109 +605,27 @@ struct DriveWalk {
                     if (!goes_on_with(too_long)) return false;
                     break;
                 }
-                shorten();
+                series.shorten();
                 s *= real(0.5);
             }
             if (first.doubtful && !goes_on_with(two_at_once)) return false;
             if (first.guard >= 0) {
-                move(s, first.at);
+                x.angle += series.move(s, first.at, laws.inverse, x);
                 if (has_tangent) move_tangent(s * first.at);
                 left -= first.at * s;
                 fired = first.guard;
                 return true;
             }
-            move(s, 1);
+            x.angle += series.move(s, 1, laws.inverse, x);
             if (has_tangent) move_tangent(s);
             left = s == left ? 0 : left - s;
         }
         return true;
     }
 
-    // The series over a time s.
-    void expand(real s) {
-        const real reached = r.norm * s;
-        int longest = 4;
-        while (longest < laws.most_degree && reached > laws.reach[longest]) ++longest;
-        real q = x.q, a = x.a, v = x.v, d = x.d;
-        y[0][0] = q;
-        y[1][0] = a;
-        y[2][0] = v;
-        y[3][0] = d;
-        q = s * r.q.at(x);
-        a = s * r.a.at(x);
-        real w = s * r.w.at(x);
-        d = r.twists ? s * x.v : 0;
-        v = r.twists ? a - w : 0;
-        y[0][1] = q;
-        y[1][1] = a;
-        y[2][1] = v;
-        y[3][1] = d;
-        for (int c = 0; c < 4; ++c) tail[c] = 0;
-        const auto size = [&] {
-            return most(most(magnitude(q) * r.per_q, magnitude(d) * r.per_d), most(magnitude(a), magnitude(v)));
-        };
-        const real enough = real(0.0625) * ROUNDING * size();
-        // The k-th derivative times s^k, and 1/k!: a chain of products of the matrix alone is the shortest.
-        const real qq = s * r.q.q, qa = s * r.q.a, aq = s * r.a.q, aa = s * r.a.a, av = s * r.a.v, ad = s * r.a.d,
-                   vq = s * r.v.q, va = s * r.v.a, vv = s * r.v.v, vd = s * r.v.d, dv = r.twists ? s : 0;
-        real share = 1, by_q = q, by_a = a, by_v = v, by_d = d;
-        int k = 2;
-        for (; k <= longest; ++k) {
-            const real next_q = qq * by_q + qa * by_a;
-            const real next_a = (aq * by_q + aa * by_a) + (av * by_v + ad * by_d);
-            const real next_v = (vq * by_q + va * by_a) + (vv * by_v + vd * by_d);
-            by_d = dv * by_v;
-            by_q = next_q;
-            by_a = next_a;
-            by_v = next_v;
-            share *= laws.inverse[k];
-            q = share * by_q;
-            a = share * by_a;
-            v = share * by_v;
-            d = share * by_d;
-            y[0][k] = q;
-            y[1][k] = a;
-            y[2][k] = v;
-            y[3][k] = d;
-            if (k > 3) {
-                tail[0] += magnitude(q);
-                tail[1] += magnitude(a);
-                tail[2] += magnitude(v);
-                tail[3] += magnitude(d);
-                // The terms beyond are bounded by this one and |A| s.
-                if ((k & 1) == 0 && reached * laws.inverse[k + 1] * size() <= enough) break;
-            }
-        }
-        degree = k < longest ? k : longest;
-    }
-    // To half of its time.
-    void shorten() {
-        real share = 1;
-        for (int c = 0; c < 4; ++c) tail[c] = 0;
-        for (int k = 0; k <= degree; ++k, share *= real(0.5))
-            for (int c = 0; c < 4; ++c) {
-                y[c][k] *= share;
-                if (k > 3) tail[c] += magnitude(y[c][k]);
-            }
-    }
-    // To the share `at` of the time of the series.
-    void move(real s, real at) {
-        real sum[4], turned = (y[1][degree] - y[2][degree]) * laws.inverse[degree + 1];
-        for (int c = 0; c < 4; ++c) sum[c] = y[c][degree];
-        for (int k = degree - 1; k >= 0; --k) {
-            for (int c = 0; c < 4; ++c) sum[c] = at * sum[c] + y[c][k];
-            turned = at * turned + (y[1][k] - y[2][k]) * laws.inverse[k + 1];
-        }
-        x.q = sum[0];
-        x.a = sum[1];
-        x.v = sum[2];
-        x.d = sum[3];
-        x.angle += s * (at * turned);
-    }
-
     // The rates of the state.
     void rates(real* to) const {
-        const real twists = r.twists ? 1 : 0;
+        const real twists = r.twists;
         to[0] = r.q.at(x);
         to[1] = r.a.at(x);
         to[2] = twists * r.v.at(x);
@@ -801,7 +700,7 @@ struct DriveWalk {
         for (int c = 0; c < 4; ++c) tangent[c] += time * rate[c];
     }
     void move_tangent(real s) {
-        const real reached = r.norm * s, twists = r.twists ? 1 : 0;
+        const real reached = r.norm * s, twists = r.twists;
         int longest = 4;
         while (longest < laws.most_degree && reached > laws.reach[longest]) ++longest;
         const ByInputs inputs = by_inputs();
@@ -829,17 +728,10 @@ struct DriveWalk {
         first.doubtful = false;
         for (int g = 0; g < r.n; ++g) {
             const Form& f = r.guards[g].form;
-            real c[4];
-            for (int k = 0; k < 4; ++k) c[k] = (f.q * y[0][k] + f.a * y[1][k]) + (f.v * y[2][k] + f.d * y[3][k]);
-            c[0] += f.one;
-            const real rest = (magnitude(f.q) * tail[0] + magnitude(f.a) * tail[1]) +
-                              (magnitude(f.v) * tail[2] + magnitude(f.d) * tail[3]);
-            // Bernstein coefficients of the cubic.
-            const real third = real(1) / 3, b1 = c[0] + third * c[1], b2 = b1 + third * (c[1] + c[2]),
-                       b3 = (c[0] + c[1]) + (c[2] + c[3]);
-            if (least(least(c[0], b1), least(b2, b3)) > rest) continue;
+            const DriveSeries::Cubic cubic = series.cubic(f);
+            if (DriveSeries::stays_positive(cubic)) continue;
             real at = 0;
-            const Verdict v = judge(f, c, rest, s, first.at, fresh, at, halve);
+            const Verdict v = judge(f, cubic.c, cubic.rest, s, first.at, fresh, at, halve);
             if (v == unsure) return false;
             if (halve) return true;
             if (v == yes) continue;
@@ -853,7 +745,6 @@ struct DriveWalk {
         return true;
     }
 
-    real term(const Form& f, int k) const { return (f.q * y[0][k] + f.a * y[1][k]) + (f.v * y[2][k] + f.d * y[3][k]); }
     // Does a guard whose cubic is c stay positive, or does it fall later than another that falls `before`? No: it falls
     // through zero once, there.
     Verdict judge(const Form& f, const real* c, real rest, real s, real before, bool fresh, real& at,
@@ -882,9 +773,10 @@ struct DriveWalk {
             halve = !(c[3] > rest);
             return yes;
         }
-        real all[longest_series + 1], end = 0, slope_rest = 0;
+        const int degree = series.degree;
+        real all[DriveSeries::longest + 1], end = 0, slope_rest = 0;
         for (int k = degree; k >= 4; --k) {
-            end += all[k] = term(f, k);
+            end += all[k] = series.term(f, k);
             slope_rest += k * magnitude(all[k]);
         }
         const real d0 = c[1], d1 = c[1] + c[2], d2 = c[1] + 2 * c[2] + 3 * c[3];
@@ -893,31 +785,38 @@ struct DriveWalk {
             halve = true;
             return yes;
         }
-        int n = degree;
         for (int k = 0; k < 4; ++k) all[k] = c[k];
         end += c[3] + c[2] + c[1] + c[0];
         if (end >= 0) return yes;
-        while (n > 3 && magnitude(all[n]) < real(1e-3) * ROUNDING * size) --n;
-        const auto value_at = [&](real t, int to, real& slope) {
-            real value = all[to];
-            slope = 0;
-            for (int k = to - 1; k >= 0; --k) {
-                slope = slope * t + value;
-                value = value * t + all[k];
+        int pairs = degree / 2 + 1;
+        all[2 * pairs - 1] = degree % 2 == 0 ? 0 : all[degree];
+        while (pairs > 2 &&
+               magnitude(all[2 * pairs - 2]) + magnitude(all[2 * pairs - 1]) < real(1e-3) * ROUNDING * size)
+            --pairs;
+        // Even and odd terms, as polynomials of t^2: four chains, which do not wait for each other.
+        const auto value_at = [&](real t, int of, real& slope) {
+            const real u = t * t;
+            real even = 0, odd = 0, even_slope = 0, odd_slope = 0;
+            for (int k = of - 1; k >= 0; --k) {
+                even_slope = even_slope * u + even;
+                odd_slope = odd_slope * u + odd;
+                even = even * u + all[2 * k];
+                odd = odd * u + all[2 * k + 1];
             }
-            return value;
+            slope = odd + 2 * t * (even_slope + t * odd_slope);
+            return even + t * odd;
         };
         real slope;
-        if (before <= 1 && value_at(before + together(), n, slope) > zero) return yes;  // another one falls first
+        if (before <= 1 && value_at(before + together(), pairs, slope) > zero) return yes;  // another one falls first
         // Newton's method within the bracket that the zero lies in, first of the terms that matter most. Steps shrink
         // quadratically: once short, the next one would be below rounding.
         real low = 0, high = 1, t = c[0] / (c[0] - end);
         for (int m = 0; m < 3; ++m) {
-            const real value = value_at(t, n < 6 ? n : 6, slope), next = t - value / slope;
+            const real value = value_at(t, pairs < 3 ? pairs : 3, slope), next = t - value / slope;
             if (next > 0 && next < 1) t = next;
         }
         for (int m = 0; m < 60; ++m) {
-            const real value = value_at(t, n, slope);
+            const real value = value_at(t, pairs, slope);
             (value > 0 ? low : high) = t;
             const real next = t - value / slope;
             const bool close = magnitude(next - t) <= together(), inside = next > low && next < high;
@@ -930,13 +829,13 @@ struct DriveWalk {
     }
     // The sum of the magnitudes of the terms that the rate of a form consists of.
     real size_of_rate(const Form& f) const {
-        return magnitude(f.q) * r.q.size(x) + magnitude(f.a) * r.a.size(x) +
-               magnitude(f.v) * (r.twists ? r.v.size(x) : 0) + magnitude(f.d) * (r.twists ? magnitude(x.v) : 0);
+        return magnitude(f.q) * r.q.size(x) + magnitude(f.a) * r.a.size(x) + magnitude(f.v) * r.twists * r.v.size(x) +
+               magnitude(f.d) * r.twists * magnitude(x.v);
     }
     // Does a guard that is zero rise from there, by the first of its derivatives that is not zero?
     Verdict departs(const Guard& g) const {
         const Form& f = g.form;
-        const real on = r.twists ? 1 : 0;
+        const real on = r.twists;
         bool moves = false;
         real t[4] = {r.q.at(x), r.a.at(x), on * r.v.at(x), on * x.v};
         real m[4] = {r.q.size(x), r.a.size(x), on * r.v.size(x), on * magnitude(x.v)};
