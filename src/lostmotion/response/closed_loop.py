@@ -109,20 +109,31 @@ class ClosedLoop:
 
     def state(self) -> tuple[np.ndarray, tuple[int, ...]]:
         """The numbers that vary continuously, and the modes of the contacts with the pieces of the laws."""
-        now = self.core.get_state()
-        repeating = np.delete(now["control"][1:], self._running)
-        return np.array([*now["state"], *now["memory"], *repeating]), tuple(now["regime"])
+        return state_of(self.core, self._running)
 
     def set_state(self, numbers: np.ndarray) -> None:
         """Set the state, in the present modes."""
-        now = self.core.get_state()
-        v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
-        known = n + len(now["inputs"])  # of the course: rates, and the inputs that they belong to
-        now["course"][known:] = [0.0] * (len(now["course"]) - known)
-        next_sample, *slots = now["control"]
-        slots = np.array(slots)
-        slots[np.delete(np.arange(len(slots)), self._running)] = v[m:]
-        self.core.set_state(now | {"state": v[:n], "memory": v[n:m], "control": [next_sample, *slots.tolist()]})
+        set_state(self.core, self._running, numbers)
+
+
+def state_of(core: Any, running: list[int]) -> tuple[np.ndarray, tuple[int, ...]]:
+    """The numbers of a stepped drive that vary continuously, and the modes of the contacts with the pieces of the laws.
+
+    running: slots of the controllers that no motion restores.
+    """
+    now = core.get_state()
+    return np.array([*now["state"], *now["memory"], *np.delete(now["control"][1:], running)]), tuple(now["regime"])
+
+
+def set_state(core: Any, running: list[int], numbers: np.ndarray) -> None:
+    """Set these numbers, in the present modes."""
+    now = core.get_state()
+    v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
+    known = n + len(now["inputs"])  # of the course: rates, and the inputs that they belong to
+    now["course"][known:] = [0.0] * (len(now["course"]) - known)
+    slots = np.array(now["control"])
+    slots[1:][np.delete(np.arange(len(slots) - 1), running)] = v[m:]
+    core.set_state(now | {"state": v[:n], "memory": v[n:m], "control": slots.tolist()})
 
 
 class _UnderSine(Simulation):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
@@ -63,22 +63,22 @@ class HuntingCertificate:
     """hunts, does not hunt, or not decided"""
     reason: str
     """why it does not hunt, or what could not be shown; empty if it hunts"""
-    contact: str
+    contact: str = ""
     """contact that sticks; empty where there is no map"""
-    map: xarray.Dataset | None
+    map: xarray.Dataset | None = None
     """``image`` over ``error``: the error left after a slip that begins with an error; ``slip_time`` and ``stuck_time`` [s]; without
     the errors whose slips are more than one linear regime; of a sampled controller ``image`` about a band, without encoder steps"""
-    fixed_points: tuple[FixedPoint, ...]
+    fixed_points: tuple[FixedPoint, ...] = ()
     """limit cycles, those without stability among them; none of a sampled controller"""
-    largest_error: float
+    largest_error: float = math.nan
     """largest starting error for which the verdict is shown"""
-    band: tuple[float, float] | None
+    band: tuple[float, float] | None = None
     """magnitudes of errors that the map takes into themselves, of a verdict that it hunts"""
-    ranges: tuple[tuple[float, float], ...]
+    ranges: tuple[tuple[float, float], ...] = ()
     """magnitudes of starting errors from which the band is reached"""
-    factor: float
+    factor: float = math.nan
     """bound of the share of its error that each slip leaves, of a verdict that it does not hunt; NaN where no slip begins"""
-    reached: float
+    reached: float = math.nan
     """error with which the run of the scenario first sticks until all but the integrator has settled; NaN if it was not found"""
 
     def __repr__(self) -> str:
@@ -160,10 +160,11 @@ def hunting_certificate(
     try:
         contact = stick_slip(train)
     except UndecidableError as why:
-        return _without_map("not decided", str(why))
+        return HuntingCertificate("not decided", str(why))
     except AtRestError as why:
         return _at_rest(why, rests=_comes_to_rest(loop))
-    largest = largest_error or _travel(train)
+    (controller,) = train.continuous().values()
+    largest = largest_error or _travel(value for _, value, _ in controller.reference.breakpoint_list())
     proof = prove(contact, largest)
     reached, fades = _reached(loop, contact, proof)
     points = _map(contact, proof, largest)
@@ -182,15 +183,10 @@ def _with_proof(proof: Proof, contact: str, reached: float, *, is_reached: bool)
     return HuntingCertificate(verdict, reason, contact, None, (), *ends)
 
 
-def _without_map(verdict: Certainty, reason: str) -> HuntingCertificate:
-    none = math.nan
-    return HuntingCertificate(verdict, reason, "", None, (), none, None, (), none, none)
-
-
 def _at_rest(why: AtRestError, *, rests: bool) -> HuntingCertificate:
     if rests:
-        return _without_map("does not hunt", str(why))
-    return _without_map("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
+        return HuntingCertificate("does not hunt", str(why))
+    return HuntingCertificate("not decided", f"{why}, but the run of the scenario is not seen to come to rest")
 
 
 def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None = None) -> HuntingCertificate:
@@ -211,20 +207,15 @@ def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None
         )
     try:
         contact = sampled_slip(axis)
-        proof = prove_sampled(contact, largest_error or _sampled_travel(axis))
+        times = np.linspace(0.0, axis.controller.reference.duration, 2001)
+        proof = prove_sampled(contact, largest_error or _travel(axis.controller.reference.at(times)[0]))
     except UndecidableError as why:
-        return _without_map("not decided", str(why))
+        return HuntingCertificate("not decided", str(why))
     except AtRestError as why:
         return _at_rest(why, rests=rests())
     reached = math.nan if proof.verdict == "not decided" else reached_by_run(axis, contact, proof.largest)
     found = _with_proof(proof, contact.name, reached, is_reached=abs(reached) <= proof.largest)
     return replace(found, map=_sampled_map(contact, proof, train))
-
-
-def _sampled_travel(axis: Axis) -> float:
-    """Largest distance of the reference from where it begins; 1 where it never moves."""
-    times = np.linspace(0.0, axis.controller.reference.duration, 2001)
-    return float(np.abs(np.append(axis.controller.reference.at(times)[0], 0.0)).max()) or 1.0
 
 
 def _sampled_map(contact: SampledSlip, proof: Proof, train: Scenario) -> xarray.Dataset | None:
@@ -250,12 +241,9 @@ def _unit(train: Scenario) -> str:
     return train.train().angle_unit((shafts or [None])[0] or list(train.train().shafts)[-1])
 
 
-def _travel(train: Scenario) -> float:
-    """Largest distance of the reference from where it begins; 1 where it never moves."""
-    (controller,) = train.continuous().values()
-    points = controller.reference.breakpoint_list()
-    values = [value for _, value, _ in points] + [0.0]
-    return float(np.ptp(values)) or 1.0
+def _travel(values: Iterable[float]) -> float:
+    """Travel of a reference with these values from 0 on; 1 where it never moves."""
+    return float(np.ptp([0.0, *values])) or 1.0
 
 
 def _comes_to_rest(loop: UndrivenLoop) -> bool:

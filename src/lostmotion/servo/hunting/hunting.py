@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import os
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,17 +39,17 @@ class Hunting:
     """hunts; at rest, of a state that is shown to be an equilibrium; not decided"""
     reason: str
     """why there is no limit cycle, or what was watched in vain; empty if there is one"""
-    exact: bool
+    exact: bool = False
     """by Newton's method with the period as an unknown; else by statistics of a long run, as of sampled controllers"""
-    frequency: float
+    frequency: float = NAN
     """[Hz]; NaN without a limit cycle"""
-    amplitudes: Mapping[str, float]
+    amplitudes: Mapping[str, float] = field(default_factory=dict)
     """half of what each variable swings by (SI)"""
-    motion: xarray.Dataset | None
+    motion: xarray.Dataset | None = None
     """one period, with the Jacobian of the map over it, of an exact one"""
-    multipliers: np.ndarray
+    multipliers: np.ndarray = field(default_factory=lambda: np.array([]))
     """Floquet multipliers of an exact one, without the multiplier of its phase, which is 1"""
-    causes: tuple[str, ...]
+    causes: tuple[str, ...] = ()
     """causes without which there is no limit cycle, or less than half of the amplitude: backlash, dry friction, static friction (in excess of the
     friction in motion), saturation, encoder resolution"""
 
@@ -116,18 +116,14 @@ def limit_cycle(scenario: Scenario, *, motor: str | None = None, causes: bool = 
                 "limit_cycle: the scenario has sampled and continuous controllers; give all of them one kind"
             )
         return _sampled(train, motor, causes=causes)
-    found = _found(train)
+    found = find_limit_cycle(train)
     if found.reason:
-        return Hunting(found.verdict, found.reason, True, NAN, {}, None, np.array([]), ())
+        return Hunting(found.verdict, found.reason, exact=True)
     plant = plant_of(train)
     motion = motion_of(found.result, plant, found.period)
     amplitudes = {v.name: 0.5 * float(np.ptp(motion[v.name].values)) for v in plant.variables}
     found_causes = _causes(train, found) if causes else ()
     return Hunting("hunts", "", True, 1.0 / found.period, amplitudes, motion, _multipliers(found), found_causes)
-
-
-def _found(train: Scenario) -> CycleSearch:
-    return find_limit_cycle(UndrivenLoop.of(train), train.simulation.duration)
 
 
 def _multipliers(found: CycleSearch) -> np.ndarray:
@@ -149,7 +145,9 @@ def _causes(train: Scenario, found: CycleSearch) -> tuple[str, ...]:
         "static friction": without_static_friction(train),
         "saturation": without_saturation(train),
     }
-    return tuple(name for name, other in left_out.items() if other is not None and _swing(_found(other), watched) < low)
+    return tuple(
+        name for name, other in left_out.items() if other is not None and _swing(find_limit_cycle(other), watched) < low
+    )
 
 
 def without_static_friction(train: Scenario) -> Scenario | None:
@@ -189,7 +187,7 @@ def _sampled(train: Scenario, motor: str | None, *, causes: bool) -> Hunting:
     cycle = watched(axis) if causes else None
     rest = cycle.whole if cycle is not None else at_rest(axis)
     if not rest.cycles:
-        return Hunting(rest.verdict, rest.described(), False, NAN, {}, None, np.array([]), ())
+        return Hunting(rest.verdict, rest.described())
     angles = (axis.train.variable(axis.motor_shaft, "angle"), axis.train.variable(axis.shaft, "angle"))
     amplitudes = dict(zip(angles, (rest.motor_amplitude, rest.amplitude), strict=True))
     found = tuple(cycle.causes) if cycle is not None else ()
@@ -296,7 +294,7 @@ def _point(train: Scenario, variable: str) -> tuple[float, float, bool, str, str
         verdict, reason, stable = hunting.verdict, hunting.reason, hunting.stable
         amplitude, frequency = hunting.amplitudes.get(variable, 0.0), hunting.frequency
     else:
-        exact = _found(train)
+        exact = find_limit_cycle(train)
         verdict, reason, stable, amplitude, frequency = exact.verdict, exact.reason, False, 0.0, NAN
         if not reason:
             amplitude, frequency = 0.5 * _swing(exact, variable), 1.0 / exact.period

@@ -18,7 +18,7 @@ from typing import Literal
 import numpy as np
 
 from ...model.shaft_ratio import turns
-from ...response.closed_loop import running_slots
+from ...response.closed_loop import running_slots, set_state, state_of
 from ...response.closed_response import frame_of
 from ...simulation.runs.stuck_contacts import explain
 from ...simulation.scenario.scenario import Scenario
@@ -171,9 +171,7 @@ class WatchedRun:
     # --- what follows from the state ---
 
     def _numbers(self) -> tuple[np.ndarray, tuple[int, ...]]:
-        now = self.core.get_state()
-        repeating = np.delete(now["control"][1:], self._running)
-        return np.array([*now["state"], *now["memory"], *repeating]), tuple(now["regime"])
+        return state_of(self.core, self._running)
 
     def _look(self) -> _Look | None:
         """The state now; None where a contact slips, or a shaft without friction moves, which may reach a flank of its gap."""
@@ -244,7 +242,8 @@ class WatchedRun:
         """Skip so many windows, if the next one then goes as predicted."""
         kept: SimulationState = self.simulation.state
         last = looks[-1].numbers - looks[-2].numbers
-        self._set(looks[-1].numbers + windows * last + 0.5 * windows * (windows + 1) * bend)
+        numbers = looks[-1].numbers + windows * last + 0.5 * windows * (windows + 1) * bend
+        set_state(self.core, self._running, numbers)
         wanted = last + (windows + 1) * bend
         after = self.looks(window) if windows > 0 else None
         if after is not None:
@@ -255,13 +254,6 @@ class WatchedRun:
                 return True
         self.simulation.state = kept
         return False
-
-    def _set(self, numbers: np.ndarray) -> None:
-        """Set the state, in the present modes."""
-        now = self.core.get_state()
-        v, n, m = numbers.tolist(), len(now["state"]), len(now["state"]) + len(now["memory"])
-        new = {"state": v[:n], "memory": v[n:m], "course": [0.0] * len(now["course"])}
-        self.core.set_state(now | new | {"control": [now["control"][0], *v[m:]]})
 
     # --- what follows from the motion ---
 

@@ -113,12 +113,9 @@ class UndrivenLoop:
         )
 
 
-def find_limit_cycle(loop: UndrivenLoop, duration: float) -> CycleSearch:
-    """The limit cycle that a run from the start leads to.
-
-    duration: of the shortest run [s]; where it does not suffice, longer ones follow.
-    """
-    reason, first = "", 0.0
+def find_limit_cycle(scenario: Scenario) -> CycleSearch:
+    """The limit cycle that a run of a scenario leads to; where its duration does not suffice, longer runs follow."""
+    loop, duration, reason, first = UndrivenLoop.of(scenario), scenario.simulation.duration, "", 0.0
     for _ in range(LONGER):
         whole = loop.settled + duration
         run = loop.run(whole, SAMPLES)

@@ -34,16 +34,24 @@ MOST_SETTLING = 20_000  # ticks
 
 
 @dataclass(frozen=True)
-class SampledSlip:
+class RigidPlant:
+    """A rigid axis at its contact: ``J w' = J a w + M - T_C``, ``M`` being a gain times the command."""
+
+    shaft: str
+    breakaway: float  # T_S
+    sliding: float  # T_C
+    inertia: float  # inertia of all that turns, at the contact
+    viscous: float  # rate by which the speed decays without torque, not positive [1/s]
+    gain: float
+    lag: float  # time constant of the torque [s]; 0: the torque follows the controller at once
+
+
+@dataclass(frozen=True)
+class SampledSlip(RigidPlant):
     """Matrices of slip, stuck interval and controller over a sample time, the slip being forward."""
 
     name: str
     tick: float  # [s]
-    inertia: float  # inertia of all that turns, at the contact
-    viscous: float  # rate by which the speed decays without torque, not positive [1/s]
-    sliding: float  # T_C
-    breakaway: float  # T_S
-    lag: float  # time constant of the torque [s]; 0: the torque follows the controller at once
     step: float  # q, resolution of the encoder at the contact's shaft; 0 for an ideal one
     offset: float  # f: the reference is this share of a step beyond the middle of one, from -1/2 to 1/2
     ratio: float  # turns of the encoder for one of the contact
@@ -156,8 +164,7 @@ def sampled_slip(axis: Axis) -> SampledSlip:
         raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")
     core, state = axis.scenario.core(), TrainInitial()
     shaft, breakaway = only_contact(train, core, start_values(train, state), state.of_all("hysteresis_capacities"))
-    plant = _Plant.of(axis, shaft, breakaway)
-    return _assembled(axis, plant)
+    return _assembled(axis, _plant_of(axis, shaft, breakaway))
 
 
 def _nonlinear(axis: Axis) -> Any:
@@ -178,43 +185,30 @@ def _nonlinear(axis: Axis) -> Any:
         yield "a dead zone of the integrator"
 
 
-@dataclass(frozen=True)
-class _Plant:
-    """A rigid axis at its contact: ``J w' = J a w + M - T_C``, ``M`` being a gain times the command."""
-
-    shaft: str
-    breakaway: float
-    sliding: float
-    inertia: float
-    viscous: float
-    gain: float
-    lag: float
-
-    @classmethod
-    def of(cls, axis: Axis, shaft: str, breakaway: float) -> _Plant:
-        train = axis.train
-        ratios = {name: turns(train, name, shaft) for name in train.shafts}
-        still, forward, reverse = (
-            model_at(axis, TrainInitial(speeds={n: w * i for n, i in ratios.items() if i is not None and w}))
-            for w in (0.0, SLIP_SPEED, -SLIP_SPEED)
-        )
-        if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
-            raise UndecidableError("it slips forward otherwise than in reverse")
-        row = np.eye(len(forward.states))[forward.states.index(train.variable(shaft, "speed"))]
-        friction = 0.5 * (forward.rate - reverse.rate)
-        along = friction / (row @ friction)
-        viscous = float(row @ forward.A @ along)
-        turned = forward.A @ along - viscous * along
-        if np.abs(forward.A @ turned).max() > NONE * np.abs(forward.A).max():
-            raise UndecidableError("a gear or spring between its shafts is soft; take a rigid one")
-        k = forward.outputs.index(train.variable(shaft, "contact_torque"))
-        sliding = float(0.5 * (forward.offset[k] - reverse.offset[k]))
-        gain, push, lag = _torque(axis, still, forward, row, k)
-        inertia = sliding / abs(float(row @ friction))
-        if abs(push * inertia - gain) > NONE * abs(gain):
-            raise UndecidableError("the torque that frees the contact is not the one that moves it")
-        same = abs(breakaway - sliding) <= NONE * breakaway
-        return cls(shaft, sliding if same else breakaway, sliding, inertia, viscous, gain, lag)
+def _plant_of(axis: Axis, shaft: str, breakaway: float) -> RigidPlant:
+    train = axis.train
+    ratios = {name: turns(train, name, shaft) for name in train.shafts}
+    still, forward, reverse = (
+        model_at(axis, TrainInitial(speeds={n: w * i for n, i in ratios.items() if i is not None and w}))
+        for w in (0.0, SLIP_SPEED, -SLIP_SPEED)
+    )
+    if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
+        raise UndecidableError("it slips forward otherwise than in reverse")
+    row = np.eye(len(forward.states))[forward.states.index(train.variable(shaft, "speed"))]
+    friction = 0.5 * (forward.rate - reverse.rate)
+    along = friction / (row @ friction)
+    viscous = float(row @ forward.A @ along)
+    turned = forward.A @ along - viscous * along
+    if np.abs(forward.A @ turned).max() > NONE * np.abs(forward.A).max():
+        raise UndecidableError("a gear or spring between its shafts is soft; take a rigid one")
+    k = forward.outputs.index(train.variable(shaft, "contact_torque"))
+    sliding = float(0.5 * (forward.offset[k] - reverse.offset[k]))
+    gain, push, lag = _torque(axis, still, forward, row, k)
+    inertia = sliding / abs(float(row @ friction))
+    if abs(push * inertia - gain) > NONE * abs(gain):
+        raise UndecidableError("the torque that frees the contact is not the one that moves it")
+    same = abs(breakaway - sliding) <= NONE * breakaway
+    return RigidPlant(shaft, sliding if same else breakaway, sliding, inertia, viscous, gain, lag)
 
 
 def _torque(
@@ -229,7 +223,7 @@ def _torque(
     return float(still.C[contact, m] * torque), float(speed @ forward.A[:, m] * torque), current.time_constant
 
 
-def _assembled(axis: Axis, plant: _Plant) -> SampledSlip:
+def _assembled(axis: Axis, plant: RigidPlant) -> SampledSlip:
     law, _, encoder = axis.law
     tick, frame = axis.controller.sample_time, math.lcm(*(n for _, _, n in axis.controller.schedules()))
     options: dict[str, Any] = {"outermost": _core.Loop.position, "cut": False, "sample_time": tick}
@@ -252,13 +246,9 @@ def _assembled(axis: Axis, plant: _Plant) -> SampledSlip:
     slip, push, stuck = _propagated(plant, tick, command, own)
     resolution, offset = _steps(axis, encoder)
     return SampledSlip(
+        **vars(plant),
         name=axis.train.variable(plant.shaft, "contact"),
         tick=tick,
-        inertia=plant.inertia,
-        viscous=plant.viscous,
-        sliding=plant.sliding,
-        breakaway=plant.breakaway,
-        lag=plant.lag,
         step=resolution / abs(ratio),
         offset=offset,
         ratio=ratio,
@@ -285,7 +275,9 @@ def _remembered(steps: list[np.ndarray], kept: set[int]) -> list[int]:
     return sorted(kept)
 
 
-def _propagated(plant: _Plant, tick: float, command: np.ndarray, own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _propagated(
+    plant: RigidPlant, tick: float, command: np.ndarray, own: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Matrix of a tick of the slip, what friction adds to it, and the matrix of a tick of the stuck interval."""
     from scipy.linalg import expm
 
@@ -321,7 +313,9 @@ def _steps(axis: Axis, encoder: str) -> tuple[float, float]:
     return step, value / step - round(value / step)
 
 
-def _limits(axis: Axis, plant: _Plant, torque: np.ndarray, speed: np.ndarray) -> tuple[tuple[np.ndarray, float], ...]:
+def _limits(
+    axis: Axis, plant: RigidPlant, torque: np.ndarray, speed: np.ndarray
+) -> tuple[tuple[np.ndarray, float], ...]:
     """Rows with the rest of the limits of torque and speed, less the torque of constant loads."""
     c, motor = axis.controller, axis.train.motors[axis.motor]
     assert c.speed is not None
