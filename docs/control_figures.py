@@ -7,10 +7,9 @@ from pathlib import Path
 import numpy as np
 
 import lostmotion as lm
-from lostmotion.reports.response_figures import bode_figure
 
 
 def write(out: Path) -> None:
     """The page's figure into a directory."""
     response = lm.frequency_response(lm.load("position-axis"), np.geomspace(0.2, 50.0, 40).tolist(), [0.002, 0.02, 0.2])
-    bode_figure({"position-axis": response}, "measured_position").savefig(out / "loop-response.png")
+    response.lm.plot("measured_position").savefig(out / "loop-response.png")

@@ -251,7 +251,7 @@ def test_synchronous_records_follow_from_their_sheets() -> None:
     [
         (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), r"lacks motor\.limits\.thermal_time_constant_motor; data"),
         (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, resistance=None))), r"lacks motor\.limits\.resistance, motor\.limits\.torque_constant"),
-        (lambda r: lm.sizing.temperatures(r, "m1"), "motor 'm1': the one motor is motor; leave its name out"),
+        (lambda r: lm.sizing.temperatures(r, "m1"), 'motor: "m1" is none of the motors;'),
         (lambda r: lm.sizing.temperatures(r, ambient="3 V"), "ambient"),
         (lambda r: lm.sizing.temperatures(r, repeated=True, winding=30.0), "has no beginning; leave winding and case out"),
         (lambda r: lm.sizing.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), "no end to its heat"),
@@ -279,5 +279,5 @@ def test_a_motor_of_a_train_is_chosen_by_name() -> None:
     expected = lm.sizing.temperatures(lm.simulate(single))
     assert of_one["winding_temperature"].values == pytest.approx(expected["winding_temperature"].values, rel=1e-12)
     assert float(lm.sizing.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
-    assert "motor is missing; the motors are one, two" in refused(lambda: lm.sizing.temperatures(result))
-    assert "motor 'onw': the motors are one, two" in refused(lambda: lm.sizing.motor_current(result, "onw"))
+    assert "motor: there are several motors; give one of one, two" in refused(lambda: lm.sizing.temperatures(result))
+    assert 'motor: "onw" is none of the motors; did you mean one?' in refused(lambda: lm.sizing.motor_current(result, "onw"))

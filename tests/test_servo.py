@@ -377,7 +377,7 @@ def test_a_rule_refuses_what_it_does_not_take_or_cannot_do(position_axis: Any, t
         (lambda: lm.tune(position_axis, rule="identical_radius"), "identical radius needs an inertia ratio of load to motor"),
         (lambda: lm.tune(lm.load("paper-2dof-nl-large")), "the scenario has no sampled controller; add a"),
         (lambda: sampled(uneven, "position", True), "position.sample_time: 3 ticks are no whole multiple of the 2 of the"),
-        (lambda: axis_of(two_mass({"gain": 1.0}), "x"), 'motor: "x" has no controller; those that have are m'),
+        (lambda: axis_of(two_mass({"gain": 1.0}), "x"), 'motor: "x" is none of the controllers; the controllers are m'),
         (lambda: tuned.write(tmp_path / "tuned.txt", "position-axis"), "must end in .toml"),
         (lambda: tuned.write(tmp_path / "none" / "tuned.toml", "position-axis"), "its directory does not exist"),
     ):

@@ -6,6 +6,13 @@ from collections.abc import Sequence
 RESOLUTION = 1e-9  # of the largest breakpoint; the solver takes 4e-12 of the terms of a condition for zero
 
 
+def check_rising(values: Sequence[float], name: str) -> None:
+    """Refuse values that do not rise."""
+    for k, (a, b) in enumerate(itertools.pairwise(values)):
+        if b <= a:
+            raise ValueError(f"{name} must rise, but {name}[{k + 1}] = {b} follows {a}")
+
+
 def check_apart(breakpoints: Sequence[float], name: str = "") -> None:
     """Refuse rising breakpoints that the solver cannot tell apart."""
     largest = max(map(abs, breakpoints))

@@ -6,7 +6,7 @@ import datetime
 import difflib
 import json
 import re
-from collections.abc import Iterable, Mapping
+from collections.abc import Collection, Iterable, Mapping
 from decimal import Decimal
 from fractions import Fraction
 from typing import TYPE_CHECKING, Any
@@ -77,6 +77,24 @@ def unknown_key(key: str, known: Iterable[str], inner: Iterable[str] = ()) -> st
         if near := nearest(key, last):
             return f"is not known here; did you mean {last[near]}?"
     return "is not known; " + did_you_mean(key, known, f"known here: {', '.join(known)}")
+
+
+def chosen_motor(name: str | None, motors: Collection[str], what: str, without: str) -> str:
+    """The motor that is meant: the one of this name, or the only one.
+
+    what: such as "steppers".
+    without: what is wrong where there is none.
+
+    Raises InputError: there is none, there are several, or the name is none of them.
+    """
+    if not motors:
+        raise InputError(without)
+    if name is None and len(motors) > 1:
+        raise InputError(f"there are several {what}; give one of {', '.join(motors)}", "motor")
+    if name is not None and name not in motors:
+        known = did_you_mean(name, motors, f"the {what} are {', '.join(motors)}")
+        raise InputError(f"{shown(name)} is none of the {what}; {known}", "motor")
+    return name or next(iter(motors))
 
 
 def did_you_mean(given: str, choices: Iterable[str], otherwise: str) -> str:

@@ -1,6 +1,5 @@
 """Elements that depend on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
-import itertools
 import math
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
@@ -9,7 +8,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs import core_parameters
-from ..inputs.breakpoints import check_apart
+from ..inputs.breakpoints import check_apart, check_rising
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Length, Mass, NotNegative, Positive, Torque
 
@@ -54,9 +53,7 @@ class AngleCurve(Part):
             raise ValueError(f"has {len(self.angles)} angles and {len(values)} values; give as many of each")
         if self.angles[0] != 0.0:
             raise ValueError(f"has angles that begin at {self.angles[0]}; the first must be 0")
-        for k, (a, b) in enumerate(itertools.pairwise(self.angles)):
-            if b <= a:
-                raise ValueError(f"angles must rise, but angles[{k + 1}] = {b} follows {a}")
+        check_rising(self.angles, "angles")
         check_apart((*self.angles, self.period), "angles")
         if self.angles[-1] >= self.period:
             raise ValueError(

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 from pydantic import Field, model_validator
 
 from .. import _core
-from ..inputs.breakpoints import RESOLUTION, check_apart
+from ..inputs.breakpoints import RESOLUTION, check_apart, check_rising
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Limit, NotNegative, Number, Positive, UpToOne
 from ..reproducible import total
@@ -50,9 +50,7 @@ class MeshStiffness(Part):
         shares = [share for share, _ in self.pairs]
         if shares and shares[0] != 0.0:
             raise ValueError(f"has pairs that begin at {shares[0]:g}; the first must be 0, the begin of the period")
-        for k, (a, b) in enumerate(itertools.pairwise(shares)):
-            if b <= a:
-                raise ValueError(f"shares must rise, but pairs[{k + 1}] begins at {b:g} after {a:g}")
+        check_rising(shares, "shares")
         if shares and shares[-1] >= 1.0:
             raise ValueError(
                 f"has pairs that begin at {shares[-1]:g}; the last must begin below 1, the end of the period"

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs import core_parameters
-from ..inputs.breakpoints import check_apart
+from ..inputs.breakpoints import check_apart, check_rising
 from ..inputs.part import Part
 from ..inputs.quantities import NotNegative, Number, Positive, Speed, Torque
 from .end_stops import ShaftEndStops
@@ -22,9 +22,7 @@ def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: st
         raise ValueError(f"has {len(speeds)} speeds and {len(torques)} {what}; give as many of each")
     if speeds[0] != 0.0:
         raise ValueError(f"has speeds that begin at {speeds[0]}; the first must be 0")
-    for k, (a, b) in enumerate(itertools.pairwise(speeds)):
-        if b <= a:
-            raise ValueError(f"speeds must rise, but speeds[{k + 1}] = {b} follows {a}")
+    check_rising(speeds, "speeds")
     check_apart(speeds, "speeds")
 
 

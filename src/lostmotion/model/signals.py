@@ -15,6 +15,7 @@ from pydantic import Field, model_validator
 
 from .. import _core
 from ..inputs import core_parameters
+from ..inputs.breakpoints import check_rising
 from ..inputs.core_parameters import V
 from ..inputs.part import Part
 from ..inputs.quantities import (
@@ -110,9 +111,7 @@ class Samples(Part, Generic[V]):
             raise ValueError("has fewer than two points; give at least two, or use mean")
         if self.times[0] < 0.0:
             raise ValueError(f"begins at {self.times[0]} s; times must not be negative")
-        for k, (a, b) in enumerate(itertools.pairwise(self.times)):
-            if b <= a:
-                raise ValueError(f"times must rise, but times[{k + 1}] = {b} follows {a}")
+        check_rising(self.times, "times")
         return self
 
     def breakpoints(self) -> list[Breakpoint]:

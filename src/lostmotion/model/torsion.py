@@ -1,13 +1,12 @@
 """The torsion of a gearbox: stiffness, backlash and hysteresis."""
 
-import itertools
 from typing import Annotated, Literal, Self
 
 from pydantic import model_validator
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.breakpoints import check_apart
+from ..inputs.breakpoints import check_apart, check_rising
 from ..inputs.core_parameters import TorsionCurveFields
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Share, Stiffness, UpToOne, argument
@@ -17,9 +16,7 @@ def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: s
     """Refuse segments that are no curve of a torque or a force."""
     if len(breaks) != len(slopes) - 1:
         raise ValueError(f"has {len(slopes)} slopes and {len(breaks)} breaks; it needs one break fewer")
-    for k, (a, b) in enumerate(itertools.pairwise(breaks)):
-        if b <= a:
-            raise ValueError(f"breaks must rise, but breaks[{k + 1}] = {b} follows {a}")
+    check_rising(breaks, "breaks")
     check_apart((0.0, *breaks), "breaks")
     if slopes[-1] <= 0.0:
         raise ValueError(f"ends with slope 0; the last segment must carry {what}")

@@ -18,6 +18,9 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+BODE = (9.0, 7.5)  # size of the figure of gain over phase [inch]
+
+
 @xr.register_dataset_accessor("lm")  # type: ignore[no-untyped-call]
 class ResultAccessor:
     """Figures, text and scenario of a result: ``result.lm.plot()``.
@@ -48,12 +51,13 @@ class ResultAccessor:
         InputError
             The dataset is of another kind.
         """
-        from . import plots, response_figures
+        from . import plots
         from .hunting_figures import map_figure
+        from .response import bode
 
         if "response" in self._dataset:
             name = str(of_output(self._dataset, output)["output"].item())
-            return response_figures.bode_figure({"": self._dataset}, name)
+            return plots.draw(bode({"": self._dataset}, name), 1, BODE)
         if "reason" in self._dataset and "amplitude" in self._dataset:
             return map_figure(self._dataset)
         return plots.overview(self._dataset)
@@ -67,10 +71,15 @@ class ResultAccessor:
         InputError
             The dataset is no frequency response, or has fewer than two amplitudes or frequencies.
         """
-        from . import response_figures
+        from . import plots
+        from .response import maps
 
-        name = str(of_output(self._dataset, output)["output"].item())
-        return response_figures.maps_figure(self._dataset, name)
+        found = maps(self._dataset, str(of_output(self._dataset, output)["output"].item()))
+        if not found:
+            raise InputError(
+                "maps need at least two amplitudes and two frequencies; plot() draws the response over frequency"
+            )
+        return plots.draw(found, 2, (10.0, 6.8))
 
     def _repr_html_(self) -> str:
         """A run in a notebook: the page that `lostmotion run --report` writes."""

@@ -4,10 +4,9 @@ from __future__ import annotations
 
 import re
 from collections import Counter
-from collections.abc import Callable
 from importlib.resources import files
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
@@ -25,6 +24,28 @@ from ..units.practical import RPM
 from .sheet_rows import rows_of
 
 SCREEN = 34  # records that fit on a screen with the lines around them
+QUANTITIES: dict[str, tuple[str, str, float, tuple[tuple[Any, tuple[str, ...]], ...]]] = {
+    "ratio": ("", "", 1.0, ((GearboxSheet | ActuatorSheet, ("ratio",)),)),
+    "lead": ("m", " mm", 1e3, ((ScrewSheet, ("lead",)),)),
+    "torque": (
+        "N*m",
+        " N·m",
+        1.0,
+        (
+            (GearboxSheet | ActuatorSheet, ("rated_output_torque",)),
+            (BrakeSheet, ("holding_torque",)),
+            (MotorSheet, ("rated_torque", "holding_torque")),
+        ),
+    ),
+    "force": (
+        "N",
+        " N",
+        1.0,
+        ((ScrewSheet, ("dynamic_capacity",)), (RackSheet | BeltSheet | LinearMotorSheet, ("rated_force",))),
+    ),
+    "current": ("A", " A", 1.0, ((AmplifierSheet, ("continuous_current",)),)),
+}
+"""unit, unit that is shown and factor to it, keys of the records that have it; of an amplifier [A rms]"""
 
 
 def _range(text: str | None, option: str, unit: str = "") -> tuple[float, float]:
@@ -72,23 +93,14 @@ def list_records(
     kinds = [*KINDS, *sorted({r.kind for r in records})]
     if kind is not None and kind not in kinds:
         raise InputError(f"--kind {kind}: is not known; {did_you_mean(kind, kinds, 'take one of ' + ', '.join(kinds))}")
-    bounds = [
-        (data_of, _range(text, option, unit))
-        for option, text, unit, data_of in (
-            ("ratio", ratio, "", _ratio),
-            ("torque", torque, "N*m", _rated_torque),
-            ("force", force, "N", _rated_force),
-            ("lead", lead, "m", _lead),
-            ("current", current, "A", _current),
-        )
-        if text is not None
-    ]
+    given = {"ratio": ratio, "torque": torque, "force": force, "lead": lead, "current": current}
+    bounds = {what: _range(text, what, QUANTITIES[what][0]) for what, text in given.items() if text is not None}
     found = [
         r
         for r in records
         if kind in (None, table_of(r), r.kind)
         and not (complete and r.missing())
-        and all((x := data_of(r)) is not None and low <= x <= high for data_of, (low, high) in bounds)
+        and all((x := _datum(r, what)) is not None and low <= x <= high for what, (low, high) in bounds.items())
     ]
     if not found:
         return "No record fits."
@@ -107,60 +119,28 @@ def summary() -> str:
     for (table, kind), records in of_kind.items():
         levels = Counter(level for r in records if (level := r.level()) is not None)
         runs = ", ".join(f"{number} {level}" for level, number in levels.items()) or "none"
-        spans = [
-            _span(records, data_of, unit, factor)
-            for data_of, unit, factor in (
-                (_ratio, "", 1.0),
-                (_lead, " mm", 1e3),
-                (_rated_torque, " N·m", 1.0),
-                (_rated_force, " N", 1.0),
-                (_current, " A", 1.0),
-            )
-        ]
+        spans = [_span(records, quantity) for quantity in QUANTITIES]
         rows.append(f"{table:<13} {kind:<12} {len(records):>7}  {'; '.join(filter(None, spans)):<40} {runs}")
     head = f"{'type':<13} {'kind':<12} {'records':>7}  {'ratio or lead; rated':<40} run as"
     return "\n".join([head, *rows, _counts(list(catalogue())), "Next: lostmotion catalogue --kind planetary"])
 
 
-def _span(records: list[Sheet], data_of: Callable[[Sheet], float | None], unit: str, factor: float) -> str:
-    found = [factor * x for r in records if (x := data_of(r))]
+def _span(records: list[Sheet], quantity: str) -> str:
+    _, unit, factor, _ = QUANTITIES[quantity]
+    found = [factor * x for r in records if (x := _datum(r, quantity))]
     return f"{min(found):.4g} to {max(found):.4g}{unit}" if found else ""
 
 
-def _ratio(record: Sheet) -> float | None:
-    return record.ratio if isinstance(record, GearboxSheet | ActuatorSheet) else None
-
-
-def _rated_torque(record: Sheet) -> float | None:
-    if isinstance(record, GearboxSheet | ActuatorSheet):
-        return record.rated_output_torque
-    if isinstance(record, BrakeSheet):
-        return record.holding_torque
-    return (record.rated_torque or record.holding_torque) if isinstance(record, MotorSheet) else None
-
-
-def _rated_force(record: Sheet) -> float | None:
-    """[N]."""
-    if isinstance(record, ScrewSheet):
-        return record.dynamic_capacity
-    return record.rated_force if isinstance(record, RackSheet | BeltSheet | LinearMotorSheet) else None
-
-
-def _current(record: Sheet) -> float | None:
-    """[A rms]."""
-    return record.continuous_current if isinstance(record, AmplifierSheet) else None
-
-
-def _lead(record: Sheet) -> float | None:
-    """[m]."""
-    if not isinstance(record, ScrewSheet):
-        return None
-    return record.lead if record.lead is not None else (record.pitch or 0.0) * (record.starts or 0) or None
+def _datum(record: Sheet, quantity: str) -> float | None:
+    """A quantity of a record [SI]; None of a record that has no such quantity, or lacks it."""
+    if quantity == "lead" and isinstance(record, ScrewSheet) and record.lead is None:
+        return (record.pitch or 0.0) * (record.starts or 0) or None
+    keys = next((keys for kind, keys in QUANTITIES[quantity][3] if isinstance(record, kind)), ())
+    return next((x for key in keys if (x := getattr(record, key)) is not None), None)
 
 
 def _line(record: Sheet) -> str:
-    ratio, lead, torque, force = _ratio(record), _lead(record), _rated_torque(record), _rated_force(record)
-    current = _current(record)
+    ratio, lead, torque, force, current = (_datum(record, quantity) for quantity in QUANTITIES)
     speed = None
     if isinstance(record, GearboxSheet):
         speed = record.rated_input_speed

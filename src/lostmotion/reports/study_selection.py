@@ -74,28 +74,24 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
     costs, front = prices(ranked, select), pareto_front(ranked, select)
     objective = next(iter(select.objectives))
     header = ["limit", "excludes", "alone", "best without it", objective, "relaxed by", "gain"]
-    rows = [
-        [
-            p.limit,
-            p.excludes,
-            p.alone,
-            p.best.name if p.best else "",
-            p.best.values[objective] if p.best else "",
-            p.opens,
-            p.gain,
-        ]
-        for p in costs
-    ]
+    best = [(p.best.name, p.best.values[objective]) if p.best else ("", "") for p in costs]
+    rows = [[p.limit, p.excludes, p.alone, *of, p.opens, p.gain] for p, of in zip(costs, best, strict=True)]
     near = misses(study, ranked, NEAREST) if study.axis is not None else []
     unknown, rules = not_judged(ranked), rules_not_judged(ranked)
-    told = _misses(near) if near else _misfits(ranked)
+    misfits = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
+    told = _listed("Why the others do not fit:", [f"{c.name}: {_why(c)}" for c in misfits], ALL)
+    if near:
+        told = _listed("Nearest misses:", [f"{m.candidate.name}: {m}{_of_estimate(m.candidate)}" for m in near], ALL)
+    lacking = [
+        [f"{len(g.candidates)}, such as {g.candidates[0]}: {g.datum}" for g in found] for found in (unknown, rules)
+    ]
     verdict = _verdict(table, ranked, costs, study, near)
     lines = [
         *_ranking(table, ranked, front, study),
         *_costs(table, costs, study),
         *told,
-        *_unknown(unknown, RECORDS_LACK),
-        *_unknown(rules, RULES_LACK),
+        *_listed(RECORDS_LACK, lacking[0], "on the page"),
+        *_listed(RULES_LACK, lacking[1], "on the page"),
         f"Verdict: {verdict}",
     ]
     several = len(select.objectives) > 1 and any(all(map(math.isfinite, c.values.values())) for c in ranked)
@@ -108,7 +104,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
             *_ranking_tables(table, ranked, front, study),
             *([_costs_table(table, costs, study)] if costs else []),
             *_miss_tables(near),
-            *_misfit_tables(ranked),
+            *_misfit_tables(misfits),
             *_unknown_tables(unknown, "Not judged: data that are missing"),
             *_unknown_tables(rules, "Rules that are not judged: data that are missing"),
         ),
@@ -225,18 +221,13 @@ def _estimated(candidate: RankedCandidate) -> str:
     return text if text.startswith("holds") else f"is {text}"
 
 
-def _in_short(candidate: RankedCandidate) -> str:
-    """The same, for the fitting ones: at the ends of the range of the kind."""
-    holds = candidate.estimated == HOLDS
-    return f"losses estimated, the verdict {'holds' if holds else _estimated(candidate)}"
+def _of_estimate(candidate: RankedCandidate) -> str:
+    """Remark on estimated losses, in brackets; empty where none are estimated."""
+    return f" (losses estimated, the verdict {_estimated(candidate)})" if candidate.estimated else ""
 
 
 def _why(candidate: RankedCandidate) -> str:
-    return (
-        f"{candidate.why} (losses estimated, the verdict {_estimated(candidate)})"
-        if candidate.estimated
-        else candidate.why
-    )
+    return f"{candidate.why}{_of_estimate(candidate)}"
 
 
 def _choice_title(column: str) -> str:
@@ -257,8 +248,7 @@ def _costs_table(table: pa.Table, costs: list[Price], study: Study) -> Table:
     return Table("What each limit costs", header, rows)
 
 
-def _misfit_tables(ranked: list[RankedCandidate]) -> list[Table]:
-    out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
+def _misfit_tables(out: list[RankedCandidate]) -> list[Table]:
     if not out:
         return []
     note = f"The first {MAX_ROWS} of {len(out)}; all are in `selection.csv`." if len(out) > MAX_ROWS else ""
@@ -339,7 +329,11 @@ def _ranking(table: pa.Table, ranked: list[RankedCandidate], front: list[RankedC
         notes = ["Pareto front"] if len(select.objectives) > 1 and c.run in on_front else []
         notes += [f"tightest: {c.tightest}"] if c.tightest else []
         notes += [f"not judged: {c.not_judged}"] if c.not_judged else []
-        notes += [_in_short(c)] if c.estimated else []
+        notes += (
+            [f"losses estimated, the verdict {'holds' if c.estimated == HOLDS else _estimated(c)}"]
+            if c.estimated
+            else []
+        )
         lines.append(f"  {c.name.ljust(width)}{values}" + (f"  ({'; '.join(notes)})" if notes else ""))
     if len(fitting) > MAX_LINES:
         lines.append(f"  and {len(fitting) - MAX_LINES} more, {ALL}")
@@ -371,12 +365,10 @@ def _share(x: float) -> str:
     return (f"{100.0 * x:.0f} %" if abs(x) >= 0.1 else f"{100.0 * x:.2g} %") if math.isfinite(x) else ""
 
 
-def _misses(near: list[Miss]) -> list[str]:
-    return ["Nearest misses:", *(f"  {miss.candidate.name}: {miss}{_of_estimate(miss)}" for miss in near)]
-
-
-def _of_estimate(miss: Miss) -> str:
-    return f" (losses estimated, the verdict {_estimated(miss.candidate)})" if miss.candidate.estimated else ""
+def _listed(title: str, rows: list[str], rest: str) -> list[str]:
+    """Rows under their title, of many the first; `rest`: where the others are."""
+    more = [f"and {len(rows) - MAX_LINES} more, {rest}"] if len(rows) > MAX_LINES else []
+    return [title, *(f"  {row}" for row in (*rows[:MAX_LINES], *more))] if rows else []
 
 
 def _miss_tables(near: list[Miss]) -> list[Table]:
@@ -390,23 +382,8 @@ def _miss_tables(near: list[Miss]) -> list[Table]:
     return [Table("Nearest misses", ("candidate", "over its limits by", "with a slower cycle"), rows, note)]
 
 
-def _unknown(groups: list[Lacking], title: str) -> list[str]:
-    if not groups:
-        return []
-    lines = [title]
-    lines += [f"  {len(g.candidates)}, such as {g.candidates[0]}: {g.datum}" for g in groups[:MAX_LINES]]
-    return [*lines, f"  and {len(groups) - MAX_LINES} more, on the page"] if len(groups) > MAX_LINES else lines
-
-
 def _unknown_tables(groups: list[Lacking], title: str) -> list[Table]:
     if not groups:
         return []
     rows = [[str(len(g.candidates)), g.candidates[0], g.datum] for g in groups[:MAX_ROWS]]
     return [Table(title, ("candidates", "such as", "what is missing"), rows)]
-
-
-def _misfits(ranked: list[RankedCandidate]) -> list[str]:
-    out = [c for c in ranked if not c.fits and NO_DATA not in c.violated]
-    lines = ["Why the others do not fit:"] if out else []
-    lines += [f"  {c.name}: {_why(c)}" for c in out[:MAX_LINES]]
-    return [*lines, f"  and {len(out) - MAX_LINES} more, {ALL}"] if len(out) > MAX_LINES else lines

@@ -9,7 +9,7 @@ from .hunting.certificate import HuntingCertificate as HuntingCertificate
 from .hunting.hunting import Hunting as Hunting
 from .hunting.hunting import hunting_map as hunting_map
 from .hunting.hunting import limit_cycle as limit_cycle
-from .hunting.limit_cycle_causes import AtRest as AtRest
+from .hunting.hunting_decision import AtRest as AtRest
 from .hunting.limit_cycle_causes import LimitCycle as LimitCycle
 from .linear_regimes import Axis as Axis
 from .margins import Bandwidth as Bandwidth

@@ -13,7 +13,7 @@ from .. import _core
 from ..control.axis import core_control
 from ..control.controller import Controller
 from ..errors import InputError, need
-from ..inputs.validation import shown
+from ..inputs.validation import chosen_motor
 from ..model.gear import Gear
 from ..model.shaft_ratio import tied, turns
 from ..model.signals import ForceSignal, TorqueSignal, core_signal
@@ -122,16 +122,8 @@ def axis_of(scenario: Scenario, motor: str | None = None) -> Axis:
     Raises InputError: there is no controller, there are several, or its loops are a function (law = true).
     """
     need_free_motion(scenario, "servo")
-    names = list(scenario.axes())
-    if not names:
-        raise InputError(
-            "the scenario has no sampled controller; add a [controller] table with reference, speed loop and encoder"
-        )
-    if motor is None and len(names) > 1:
-        raise InputError(f"motor: there are several controllers; name one of {', '.join(names)}")
-    name = names[0] if motor is None else motor
-    if name not in names:
-        raise InputError(f"motor: {shown(motor)} has no controller; those that have are {', '.join(names)}")
+    without = "the scenario has no sampled controller; add a [controller] table with reference, speed loop and encoder"
+    name = chosen_motor(motor, scenario.axes(), "controllers", without)
     if scenario.axes()[name].law:
         raise InputError(
             f"the controller of {name} has law = true, a function whose loops are not known; give it loops"

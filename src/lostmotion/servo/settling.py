@@ -12,8 +12,8 @@ import numpy as np
 from ..control.references import MovesReference
 from ..response.closed_response import frame_of
 from .axis_runs import changed, errors_of, first_size, ran, settled
-from .hunting.hunting_decision import moving_input, rises_of
-from .hunting.limit_cycle_causes import AtRest, watched_at_least
+from .hunting.hunting_decision import AtRest, moving_input, rises_of
+from .hunting.limit_cycle_causes import watched_at_least
 from .linear_regimes import Axis
 
 SAMPLES = 20_000  # of one cycle of the moves

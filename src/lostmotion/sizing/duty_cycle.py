@@ -6,12 +6,16 @@ to repeat without a pause, or after `task.cycle`.
 
 from __future__ import annotations
 
+import itertools
+import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..control.references import MovesReference
 from ..errors import InputError
 
 if TYPE_CHECKING:
@@ -19,6 +23,7 @@ if TYPE_CHECKING:
 
     from ..simulation.runs.results import RunArrays
 
+AnyMoves = MovesReference[Any, Any, Any, Any, Any]
 STANDSTILL = 1e-3  # below this share of its largest speed the motor is taken to be at rest
 MIN_REST = 0.01  # of the time in motion; a shorter standstill is no rest
 STEADY = 0.01  # of the largest motor torque, within which it does not change at rest
@@ -27,6 +32,45 @@ STEADY = 0.01  # of the largest motor torque, within which it does not change at
 def integral(time: np.ndarray, values: np.ndarray) -> float:
     """Integral of values over instants [s], straight between these."""
     return float(np.sum(0.5 * (values[1:] + values[:-1]) * np.diff(time)))
+
+
+def stretches(values: np.ndarray, inside: np.ndarray) -> list[float]:
+    """Sum of values over each stretch that is inside; the cycle repeats, so that a stretch may span its end."""
+    pairs = itertools.groupby(zip(values.tolist(), inside.tolist(), strict=True), key=lambda pair: pair[1])
+    each = [sum(value for value, _ in group) if within else 0.0 for within, group in pairs]
+    if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
+        each[0] += each.pop()
+    return [total for total in each if total > 0.0]
+
+
+Rest = tuple[float, float, slice]
+"""rest after a move: direction and end [s] of the move, and the samples of the rest"""
+
+
+def rests_of(reference: AnyMoves, time: np.ndarray, count: int | None = None) -> list[Rest]:
+    """Rests after the last so many moves of a reference, or after all, over instants [s]."""
+    intervals, positions = reference.intervals(), [reference.start, *(move.to for move in reference.moves)]
+    ends = [*(begin for begin, _ in intervals[1:]), time[-1]]
+    found = []
+    for k in range(0 if count is None else len(intervals) - count, len(intervals)):
+        end, step = intervals[k][1], positions[k + 1] - positions[k]
+        first, behind = np.searchsorted(time, end), np.searchsorted(time, ends[k], side="right")
+        if first < behind and step != 0.0:
+            found.append((math.copysign(1.0, step), end, slice(int(first), int(behind))))
+    return found
+
+
+def after_moves(rests: Sequence[Rest], time: np.ndarray, error: np.ndarray, window: float) -> tuple[list[float], float]:
+    """Time from the end of each move until its error stays within the window [s], infinite where it does not; and the reversal error: at
+    rest after moves forward less after moves backward, magnitude, NaN where moves go one way."""
+    settling, ends = [], {1.0: list[float](), -1.0: list[float]()}
+    for direction, end, rest in rests:
+        outside = np.flatnonzero(np.abs(error[rest]) > window)
+        stays = rest.start + (outside[-1] + 1 if len(outside) else 0)
+        settling.append(0.0 if not len(outside) else float(time[stays] - end) if stays < rest.stop else math.inf)
+        ends[direction].append(float(error[rest][-1]))
+    both = ends[1.0] and ends[-1.0]
+    return settling, abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else math.nan
 
 
 @dataclass(frozen=True)

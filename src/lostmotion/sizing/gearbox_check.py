@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection
 from typing import TYPE_CHECKING
 
-from ..model.gearbox import Gearbox, Transmission
+from ..model.gearbox import Gearbox, GearboxLimits, Transmission
 from ..model.self_locking import self_locking
 from ..model.torsion import Rigid
 from ..model.train import DriveTrain
@@ -20,33 +20,15 @@ if TYPE_CHECKING:
 
 def loads(g: Transmission, peak: float, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
     """Mean and largest output torque, `peak` [N·m] being the latter. where: the table of the gearbox."""
-    average = g.limits.average_output_torque if g.limits else None
-    name = f"{'rated' if average is None else 'average'} output torque"
-    return [
-        within(
-            "average_output_torque",
-            "output torque, cubic mean",
-            cycle.mean_output_torque,
-            average or g.rated_output_torque,
-            "N·m",
-            name,
-            key=f"{where}.rated_output_torque",
-            cycle=cycle,
-        ),
-        _with_momentary(
-            within(
-                "peak_output_torque",
-                "output torque, largest",
-                peak,
-                g.limits.peak_output_torque if g.limits else None,
-                "N·m",
-                "repeated peak torque of the gearbox",
-                key=f"{where}.limits.peak_output_torque",
-            ),
-            peak,
-            g.limits.momentary_output_torque if g.limits else None,
-        ),
-    ]
+    limits = g.limits or GearboxLimits()
+    name = f"{'rated' if limits.average_output_torque is None else 'average'} output torque"
+    most, key = limits.average_output_torque or g.rated_output_torque, f"{where}.rated_output_torque"
+    what, mean = "output torque, cubic mean", cycle.mean_output_torque
+    found = [within("average_output_torque", what, mean, most, "N·m", name, key=key, cycle=cycle)]
+    what, key = "output torque, largest", f"{where}.limits.peak_output_torque"
+    name = "repeated peak torque of the gearbox"
+    largest = within("peak_output_torque", what, peak, limits.peak_output_torque, "N·m", name, key=key)
+    return [*found, _with_momentary(largest, peak, limits.momentary_output_torque)]
 
 
 def _with_momentary(finding: Finding, torque: float, momentary: float | None) -> Finding:
@@ -61,17 +43,16 @@ def _with_momentary(finding: Finding, torque: float, momentary: float | None) ->
 
 def input_speeds(g: Transmission, cycle: DutyCycle, where: str = "gearbox") -> list[Finding]:
     """Mean and largest speed of the input."""
-    limits = g.limits
-    average = (limits.average_input_speed if limits else None) or g.rated_input_speed
-    largest = limits.max_input_speed if limits else None
+    limits = g.limits or GearboxLimits()
+    average, largest = limits.average_input_speed or g.rated_input_speed, limits.max_input_speed
     return [
         within(
             "average_input_speed",
             "input speed, mean",
             RPM * cycle.mean_input_speed,
-            None if average is None else RPM * average,
+            average and RPM * average,
             "rpm",
-            "average input speed" if limits and limits.average_input_speed else "rated input speed",
+            "average input speed" if limits.average_input_speed else "rated input speed",
             key=f"{where}.rated_input_speed",
             cycle=cycle,
         ),
@@ -79,7 +60,7 @@ def input_speeds(g: Transmission, cycle: DutyCycle, where: str = "gearbox") -> l
             "max_input_speed",
             "input speed, largest, for the gearbox",
             RPM * cycle.peak_input_speed,
-            None if largest is None else RPM * largest,
+            largest and RPM * largest,
             "rpm",
             "largest speed of the gearbox",
             key=f"{where}.limits.max_input_speed",

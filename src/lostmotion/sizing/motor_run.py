@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Temperature
-from ..inputs.validation import did_you_mean
+from ..inputs.validation import chosen_motor
 from ..model.motor import ShaftMotor
 from ..simulation.runs.results import RunArrays, scenario_of
 from ..simulation.scenario.scenario import Scenario
@@ -224,20 +224,9 @@ def _motor_of(scenario: Scenario, result: xarray.Dataset, name: str | None) -> t
     """Name of the motor, the motor, and its command, torque [N·m] and speed [rad/s] over the run."""
     train = scenario.train()
     motors = {motor: m for motor, m in train.motors.items() if not train.is_slide(m.shaft)}
-    if name is None and len(motors) == 1:
-        name = next(iter(motors))
-    if name is None or name not in motors:
-        one = f"the one motor is {next(iter(motors), '')}; leave its name out"
-        listed = one if len(motors) == 1 else f"the motors are {', '.join(motors)}" if motors else "no motor turns it"
-        hint = listed if name is None else did_you_mean(name, motors, listed)
-        raise InputError(f"motor {name!r}: {hint}" if name is not None else f"motor is missing; {hint}")
+    name = chosen_motor(name, motors, "motors", "motor: no motor turns it")
     m = motors[name]
     names = (train.variable(name, "command"), train.variable(name, "torque"), train.variable(m.shaft, "speed"))
-    return name, m, _read(result, *names)
-
-
-def _read(result: xarray.Dataset, *names: str) -> list[np.ndarray]:
-    lacking = [name for name in names if name not in result]
-    if lacking:
+    if lacking := [variable for variable in names if variable not in result]:
         raise InputError(f"the result lacks {', '.join(lacking)}; give a whole result of simulate or open_result")
-    return [result[name].values for name in names]
+    return name, m, [result[variable].values for variable in names]

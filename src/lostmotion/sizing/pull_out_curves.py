@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -13,7 +13,7 @@ from ..control.command import CommandSignal, Stepping
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.named_elements import Named
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.validation import chosen_motor, shown
 from ..model.motor import ShaftMotor
 from ..model.shaft_ratio import turns
 from ..model.signals import TorqueSignal
@@ -85,7 +85,7 @@ def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = N
     import xarray
 
     steppers = [name for name, m in scenario.train().motors.items() if m.kind == "stepper"]
-    name = one_stepper(steppers, motor, 'the scenario has no motor of kind "stepper"')
+    name = chosen_motor(motor, steppers, "steppers", 'the scenario has no motor of kind "stepper"')
     rates = _rates(step_rates)
     axis = _Axis.of(scenario, name)
     rows = [
@@ -99,21 +99,6 @@ def stepper_curves(scenario: Scenario, step_rates: Any, *, motor: str | None = N
         for key, values in zip(names, zip(*rows, strict=True), strict=True)
     }
     return xarray.Dataset(data, {"step_rate": ("step_rate", rates, {"units": "Hz"})}, {"motor": name})
-
-
-def one_stepper(steppers: Sequence[str], motor: str | None, without: str) -> str:
-    """The stepper that is meant. without: what is wrong where there is none.
-
-    Raises InputError: there is none, there are several, or `motor` is none of them.
-    """
-    if not steppers:
-        raise InputError(without)
-    if motor is None and len(steppers) > 1:
-        raise InputError(f"motor: there are several steppers; give one of {', '.join(steppers)}")
-    if motor is not None and motor not in steppers:
-        meant = did_you_mean(motor, steppers, f"the steppers are {', '.join(steppers)}")
-        raise InputError(f"motor: {shown(motor)} is no such stepper; {meant}")
-    return motor or steppers[0]
 
 
 def _rates(step_rates: Any) -> np.ndarray:

@@ -11,6 +11,7 @@ from ..control.references import MovesReference
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number
+from ..inputs.validation import chosen_motor
 from ..model.shaft_ratio import turns
 from ..model.torsion import Rigid
 from ..simulation.runs.lost_steps import LostSteps, found_in
@@ -20,7 +21,7 @@ from ..simulation.scenario.one_axis import OneAxis
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import practical
 from ..verdict import Point, Verdict
-from .pull_out_curves import one_stepper
+from .duty_cycle import after_moves, rests_of
 
 MICROSTEPS_OF_WINDOW = 4.0  # at the load, in the window by default
 NO_LOOP = "a stepper is turned without a loop, so it has no margins and nothing to tune; of its motion see the open-loop report"
@@ -117,7 +118,8 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
     if window is not None and not 0.0 < window < math.inf:
         raise InputError(f"window: {window:g} must be above 0")
     axes = [name for name in pointed(scenario) if scenario.train().motors[name].kind == "stepper"]
-    name = one_stepper(axes, motor, "the scenario has no stepper that follows a reference; give command.stepping")
+    without = "the scenario has no stepper that follows a reference; give command.stepping"
+    name = chosen_motor(motor, axes, "steppers", without)
     train, (reference, shaft) = scenario.train(), pointed(scenario)[name]
     m, ratio = train.motors[name], turns(train, train.motors[name].shaft, shaft)
     assert m.steps_per_revolution is not None
@@ -128,7 +130,8 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
     stepping = scenario.tables.command[name].stepping
     assert stepping is not None
     within = MICROSTEPS_OF_WINDOW * m.full_step / stepping.microsteps / abs(ratio) if window is None else window
-    settling, reversal = _after_moves(reference, result.time, error, within)
+    rests = rests_of(reference, result.time) if isinstance(reference, MovesReference) else []
+    settling, reversal = after_moves(rests, result.time, error, within)
     spring = 0.25 * m.steps_per_revolution * m.holding_torque * ratio * ratio
     stiffness, resonances = _chain(scenario, spring)
     (lost,) = (found for found in found_in(scenario, result) if found.motor == name)
@@ -141,36 +144,13 @@ def open_loop(scenario: Scenario, *, motor: str | None = None, window: Number | 
         resonances,
         float(np.abs(error).max()),
         within,
-        settling,
-        reversal,
+        tuple(settling),
+        None if math.isnan(reversal) else reversal,
         lost,
         result.time,
         error,
         result[train.variable(name, "electrical_angle")],
     )
-
-
-def _after_moves(
-    reference: object, time: np.ndarray, error: np.ndarray, window: float
-) -> tuple[tuple[float, ...], float | None]:
-    """Settling times after the moves of a reference, and the reversal error."""
-    if not isinstance(reference, MovesReference) or not reference.moves:
-        return (), None
-    intervals, positions = reference.intervals(), [reference.start, *(move.to for move in reference.moves)]
-    begins = [*(begin for begin, _ in intervals[1:]), math.inf]
-    settling: list[float] = []
-    ends: dict[float, list[float]] = {1.0: [], -1.0: []}
-    for k, (_, end) in enumerate(intervals):
-        rest = (time >= end) & (time <= begins[k])
-        if not rest.any() or positions[k + 1] == positions[k]:
-            continue
-        t, e = time[rest], error[rest]
-        outside = np.flatnonzero(np.abs(e) > window)
-        last = -1 if not outside.size else int(outside[-1])
-        settling.append(math.inf if last == t.size - 1 else float(t[last + 1] - end) if last >= 0 else 0.0)
-        ends[math.copysign(1.0, positions[k + 1] - positions[k])].append(float(e[-1]))
-    both = ends[1.0] and ends[-1.0]
-    return tuple(settling), abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else None
 
 
 def _chain(scenario: Scenario, field: float) -> tuple[float | None, tuple[float, ...]]:

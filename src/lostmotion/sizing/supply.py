@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -16,7 +15,7 @@ from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from .axis_rules import missing
 from .catalogue_formulas import bus_voltage, capacitor_energy
-from .duty_cycle import integral
+from .duty_cycle import integral, stretches
 from .finding import Finding, within
 from .motor_check import amperes_of, current_voltage_power
 from .motor_run import phase_amplitudes
@@ -44,14 +43,8 @@ def electrical_power(demand: InputDemand, motor: Motor) -> np.ndarray:
 
 def returned(time: np.ndarray, power: np.ndarray, cycle: float) -> Returned:
     """Energy that a power over one cycle [W] returns; the cycle repeats, so that braking may begin before its end and end after it."""
-    steps = np.diff(time)
-    energy = np.minimum(0.5 * (power[1:] + power[:-1]), 0.0) * steps
-    each: list[float] = []
-    for returns, group in itertools.groupby(energy.tolist(), key=lambda e: e < 0.0):
-        each.append(-sum(group) if returns else 0.0)
-    if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
-        each[0] += each.pop()
-    found = tuple(e for e in each if e > 0.0)
+    energy = np.maximum(-0.5 * (power[1:] + power[:-1]), 0.0) * np.diff(time)
+    found = tuple(stretches(energy, energy > 0.0))
     return Returned(max(found, default=0.0), found, float(-min(power.min(), 0.0)), cycle)
 
 
@@ -174,13 +167,7 @@ def amplifier_of_a_run(
 
 def longest_above(time: np.ndarray, values: np.ndarray, limit: float) -> float:
     """Longest time without a pause during which values are above a limit; the cycle repeats, so that it may span its end."""
-    above = np.minimum(values[1:], values[:-1]) > limit
-    each, steps = [], np.diff(time)
-    for over, group in itertools.groupby(range(len(steps)), key=lambda k: bool(above[k])):
-        each.append(float(steps[list(group)].sum()) if over else 0.0)
-    if len(each) > 1 and each[0] > 0.0 and each[-1] > 0.0:
-        each[0] += each.pop()
-    return max(each, default=0.0)
+    return max(stretches(np.diff(time), np.minimum(values[1:], values[:-1]) > limit), default=0.0)
 
 
 def effective_current(

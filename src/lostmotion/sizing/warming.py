@@ -22,7 +22,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.implausible_values import trusted
 from ..inputs.quantities import Number, Temperature, Time
-from ..inputs.validation import did_you_mean
+from ..inputs.validation import chosen_motor, did_you_mean
 from ..model.gearbox import Transmission
 from ..model.losses import LossMap
 from ..model.motor import Motor
@@ -231,13 +231,7 @@ def warm_up(
 
 def _motor(scenario: Scenario, name: str | None) -> tuple[str, Motor]:
     motors = scenario.train().motors
-    if name is None and len(motors) == 1:
-        name = next(iter(motors))
-    if name is None or name not in motors:
-        listed = f"the motors are {', '.join(motors) or 'none'}"
-        raise InputError(
-            f"warm_up: motor {did_you_mean(name, motors, listed) if name is not None else f'is missing; {listed}'}"
-        )
+    name = chosen_motor(name, motors, "motors", "warm_up: the scenario has no motor")
     found = motors[name]
     if found.kind == "synchronous":
         raise InputError(

@@ -289,14 +289,6 @@ def _named(train: Scenario, key: str) -> dict[str, str]:
 
 def _point(train: Scenario, variable: str) -> tuple[float, float, bool, str, str]:
     """Amplitude, frequency, stable, verdict, reason."""
-    if train.axes():
-        hunting = limit_cycle(train, causes=False)
-        verdict, reason, stable = hunting.verdict, hunting.reason, hunting.stable
-        amplitude, frequency = hunting.amplitudes.get(variable, 0.0), hunting.frequency
-    else:
-        exact = find_limit_cycle(train)
-        verdict, reason, stable, amplitude, frequency = exact.verdict, exact.reason, False, 0.0, NAN
-        if not reason:
-            amplitude, frequency = 0.5 * _swing(exact, variable), 1.0 / exact.period
-            stable = is_stable(_multipliers(exact))
-    return NAN if verdict == "not decided" else amplitude, frequency, stable, verdict, reason
+    h = limit_cycle(train, causes=False)
+    amplitude = NAN if h.verdict == "not decided" else h.amplitudes.get(variable, 0.0)
+    return amplitude, h.frequency, h.stable, h.verdict, h.reason

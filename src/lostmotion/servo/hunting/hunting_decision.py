@@ -12,7 +12,7 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -49,6 +49,7 @@ STEADY = (
 CONFIRMED = 3.0  # times as long a watch confirms a swing
 NOISE = 2e-9 * math.pi  # [rad], a billionth of a turn: what a shaft at rest may move by rounding
 TURN = 1e-3  # [m/rad], for which a radian counts where a linear motor moves a slide
+STILL = 1e-6  # of the swing of the load, below which the motor stands
 NOTHING_MOVES = "the state is an equilibrium: no state of drive and controllers changes"
 
 
@@ -342,18 +343,46 @@ def frequency_of(time: np.ndarray, values: np.ndarray) -> float:
 
 
 @dataclass(frozen=True)
-class Decision:
-    """Decision of a watch."""
+class AtRest:
+    """Motion of an axis after its reference has come to rest."""
 
     verdict: Verdict
     reason: str
-    watched: float  # [s], since the inputs have come to rest
-    frequency: float  # [Hz]; NaN unless it hunts
-    swing: np.ndarray  # largest less least value of each variable over the last quarter of the watch
+    """why it is at rest, or not decided"""
+    watched: float = 0.0
+    """time since the reference has come to rest [s]"""
+    motor_amplitude: float = math.nan
+    """half of what the motor's angle swings by in the last quarter of that time [rad]"""
+    amplitude: float = math.nan
+    """the same of the reference's shaft [rad]"""
+    frequency: float = math.nan
+    """[Hz]; NaN unless it hunts"""
+    begin: float = 0.0
+    """when the inputs have come to rest [s]"""
+    extrapolated: float = 0.0
+    """part of the time that was watched in which all contacts are stuck, which was not run [s]"""
+    times: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
+    """instants that were watched, from the end of the reference [s]"""
+    angles: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
+    """angle of the reference's shaft at these instants [rad]"""
+
+    @property
+    def cycles(self) -> bool:
+        """Whether it hunts."""
+        return self.verdict == "hunts"
+
+    @property
+    def floats(self) -> bool:
+        """Whether the load alone swings, while the motor stands."""
+        return self.cycles and self.motor_amplitude < STILL * self.amplitude
+
+    def described(self) -> str:
+        """Why it does not hunt, with what was watched."""
+        return f"{self.reason} ({self.watched:.4g} s after the end of the reference)"
 
 
-def decide(watch: WatchedRun, first: float, most: float) -> Decision:
-    """Watches a loop until it is shown to be at rest, or to swing on.
+def decide(watch: WatchedRun, first: float, most: float) -> AtRest:
+    """Watches the angles of motor and load until it is shown to be at rest, or to swing on.
 
     first: shortest time to watch [s].
     most: longest time to follow [s]; stuck intervals that are extrapolated do not count.
@@ -388,13 +417,16 @@ def decide(watch: WatchedRun, first: float, most: float) -> Decision:
     return _decision(watch, "not decided", _why(watch, outlook))
 
 
-def _decision(watch: WatchedRun, verdict: Verdict, reason: str) -> Decision:
+def _decision(watch: WatchedRun, verdict: Verdict, reason: str) -> AtRest:
     swing, watched, frequency = watch.swing(0.75, 1.0), watch.elapsed, math.nan
     if verdict == "hunts":
         moving = int(np.argmax(swing > watch.noise))
         quick = watch.quick_frequency(moving, 0.5 * swing[moving])
         frequency = 1.0 / watch.period() if math.isnan(quick) else quick
-    return Decision(verdict, reason, watched, frequency, swing)
+    motor, load = (0.5 * swing).tolist()
+    return AtRest(
+        verdict, reason, watched, motor, load, frequency, watch.settled, watch.skipped, watch.times, watch.rows[:, 1]
+    )
 
 
 def _why(watch: WatchedRun, outlook: Outlook) -> str:

@@ -5,11 +5,9 @@ from __future__ import annotations
 import itertools
 import math
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from operator import attrgetter
 from typing import Any
-
-import numpy as np
 
 from ...inputs.part import Part
 from ...model.couplings import Commanded
@@ -21,53 +19,13 @@ from ...response.closed_loop import slowest
 from ...simulation.scenario.scenario import Scenario
 from ..axis_runs import changed, first_size, pole_named, step_duration, with_controller
 from ..linear_regimes import Axis
-from .hunting_decision import Verdict, WatchedRun, decide, moving_input
+from .hunting_decision import AtRest, WatchedRun, decide, moving_input
 
 PART = 0.5  # of the amplitude, below which leaving something out takes a limit cycle away
 REST = 10.0  # of the slowest time constants of the loops, for which an axis is watched at least
 MOST_TICKS = 4e6  # for which it is watched at most
 PATIENCE = 4.0  # times as long as the whole axis, for which one without a possible cause is watched
-STILL = 1e-6  # of the swing of the load, below which the motor stands
 FINEST_BITS = 40  # of an encoder
-
-
-@dataclass(frozen=True)
-class AtRest:
-    """Motion of an axis after its reference has come to rest."""
-
-    verdict: Verdict
-    reason: str
-    """why it is at rest, or not decided"""
-    watched: float
-    """time since the reference has come to rest [s]"""
-    motor_amplitude: float
-    """half of what the motor's angle swings by in the last quarter of that time [rad]"""
-    amplitude: float
-    """the same of the reference's shaft [rad]"""
-    frequency: float
-    """[Hz]; NaN unless it hunts"""
-    begin: float = 0.0
-    """when the inputs have come to rest [s]"""
-    extrapolated: float = 0.0
-    """part of the time that was watched in which all contacts are stuck, which was not run [s]"""
-    times: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
-    """instants that were watched, from the end of the reference [s]"""
-    angles: np.ndarray = field(default_factory=lambda: np.zeros(0), compare=False, repr=False)
-    """angle of the reference's shaft at these instants [rad]"""
-
-    @property
-    def cycles(self) -> bool:
-        """Whether it hunts."""
-        return self.verdict == "hunts"
-
-    @property
-    def floats(self) -> bool:
-        """Whether the load alone swings, while the motor stands."""
-        return self.cycles and self.motor_amplitude < STILL * self.amplitude
-
-    def described(self) -> str:
-        """Why it does not hunt, with what was watched."""
-        return f"{self.reason} ({self.watched:.4g} s after the end of the reference)"
 
 
 @dataclass(frozen=True)
@@ -133,26 +91,13 @@ def at_rest(axis: Axis, most: float = math.inf) -> AtRest:
     if at_start or reference.sine_list() or any(reference.pieces()[-1][2:]):
         axis = with_controller(axis, reference={"kind": "position", "mean": start + first_size(axis, "position")})
     if name := moving_input(axis.scenario):
-        return AtRest("not decided", f"{name} never comes to rest", 0.0, math.nan, math.nan, math.nan)
+        return AtRest("not decided", f"{name} never comes to rest")
     first = max(watched_at_least(axis), axis.scenario.simulation.duration)
     with pole_named(axis):
         watch = WatchedRun(
             axis.scenario, (axis.train.variable(axis.motor_shaft, "angle"), axis.train.variable(axis.shaft, "angle"))
         )
-        found = decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
-    motor, load = 0.5 * found.swing
-    return AtRest(
-        found.verdict,
-        found.reason,
-        found.watched,
-        motor,
-        load,
-        found.frequency,
-        watch.settled,
-        watch.skipped,
-        watch.times,
-        watch.rows[:, 1],
-    )
+        return decide(watch, first, min(most, max(MOST_TICKS * c.sample_time, 4.0 * first)))
 
 
 def watched_at_least(axis: Axis) -> float:

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...inputs.arguments import checked
-from ...model.motor import Motor
 from ...reproducible import sin
 from ..scenario.scenario import Scenario
 from ..variables_of_trains import angle_of_run
@@ -120,8 +119,10 @@ def found_in(
 def _close(scenario: Scenario, result: xarray.Dataset | RunArrays) -> xarray.Dataset | RunArrays:
     """The run with samples so close that cubics between them follow each rotor in its field; a part of a run remains as it is."""
     train, time = scenario.train(), np.asarray(result["time"])
-    steppers = (m for m in train.motors.values() if m.kind == "stepper")
-    fastest = max((math.sqrt(_stiffest(m) / m.rotor_inertia) for m in steppers), default=0.0)
+    fastest = 0.0  # [rad/s], by the largest stiffness of field and detents, n (T_H + 4 T_D)
+    for m in (m for m in train.motors.values() if m.kind == "stepper"):
+        torque = (m.holding_torque or 0.0) + 4.0 * (m.detent_torque or 0.0)
+        fastest = max(fastest, math.sqrt(0.5 * math.pi / m.full_step * torque / m.rotor_inertia))
     whole = time.size > 1 and time[0] == 0.0 and math.isclose(time[-1], scenario.simulation.duration)
     parts = math.ceil((time[1] - time[0]) * fastest / CLOSE) if whole else 1
     if parts < 2 or parts * time.size > MOST_SAMPLES or scenario.axes():
@@ -129,12 +130,6 @@ def _close(scenario: Scenario, result: xarray.Dataset | RunArrays) -> xarray.Dat
     _, adaptive, tolerance = str(result.attrs["solver"]).partition("relative tolerance ")
     how: dict[str, Any] = {"solver": "dormand-prince", "relative_tolerance": float(tolerance)} if adaptive else {}
     return run(scenario.with_inputs(sample_interval=float(time[1]) / parts), energy=False, **how)
-
-
-def _stiffest(motor: Motor) -> float:
-    """Largest stiffness of the field and the detents of a stepper, n (T_H + 4 T_D) [N·m/rad]."""
-    field = (motor.holding_torque or 0.0) + 4.0 * (motor.detent_torque or 0.0)
-    return 0.5 * math.pi / motor.full_step * field
 
 
 @dataclass(frozen=True)

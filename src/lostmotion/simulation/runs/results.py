@@ -129,7 +129,7 @@ def raw_result(
     scenario: Scenario, core: _core.Train, result: dict[str, Any], solver: str, *, ledger: bool
 ) -> RunArrays:
     """Result of the solver with all its parts."""
-    time = _time(scenario)
+    time = scenario.simulation.instants()
     data = dict(zip(_channels(scenario), result["values"], strict=True))
     data |= named_signals(scenario.by_prefix(), result["control"])
     set_torques(scenario, data)
@@ -165,11 +165,7 @@ def _frame(scenario: Scenario) -> xarray.Dataset:
     """The dataset of its runs without their samples and attributes: to put these in takes a tenth of the time of making one."""
     nothing = np.broadcast_to(np.nan, scenario.simulation.samples)
     variables = variables_of(scenario)
-    return labelled(_time(scenario), dict.fromkeys((v.name for v in variables), nothing), {}, variables)
-
-
-def _time(scenario: Scenario) -> np.ndarray:
-    return scenario.simulation.instants()
+    return labelled(scenario.simulation.instants(), dict.fromkeys((v.name for v in variables), nothing), {}, variables)
 
 
 @kept

@@ -16,10 +16,7 @@ from ...model.train import COUPLINGS
 from ..forms.train_tables import TrainInitial
 from ..scenario.scenario import Scenario
 
-INSTANT, LEADING = (
-    0,
-    2,
-)  # of a switching: the column of its instant, and the number of columns before the columns of contacts
+INSTANT, LEADING = 0, 2  # of a switching: column of its instant, and number of columns before those of contacts
 NO_CONTACT = 2.0
 SIDE_BY_SIDE = 1_000_000  # ticks: the longest run that another one may have beside it, which Ctrl-C does not end
 SUMS = ("residual", "stored_change", "turned_over")  # of the ledger, over all elements
@@ -146,21 +143,14 @@ def joined_results(
         for name, row in zip(part.axes(), r["control"], strict=True)
     }
     ledgers = [r["energy"] for r in results]
+    entries = sorted({entry for ledger in ledgers for entry in ledger})
     return {
         "values": [rows[name] for name, *_ in core.channels()],
         "control": [signals[name] for name in whole.axes()],
         "switchings": _joined_switchings(core.contact_names(), rows, results)[:most],
         **{n: sum(r[n] for r in results) for n in ("switching_count", "steps", "mode_trials", "mode_fallbacks")},
         "end_state": dict(sorted(item for r in results for item in r["end_state"].items())),
-        "energy": dict(
-            sorted(
-                {
-                    entry: sum(ledger[entry] for ledger in ledgers if entry in ledger)
-                    for ledger in ledgers
-                    for entry in ledger
-                }.items()
-            )
-        ),
+        "energy": {entry: sum(ledger[entry] for ledger in ledgers if entry in ledger) for entry in entries},
         "left_data_at": min(r["left_data_at"] for r in results),
     }
 

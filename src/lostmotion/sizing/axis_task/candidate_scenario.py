@@ -21,6 +21,7 @@ from ...servo.tuning_data import lag_sum, secant
 from ...simulation.forms.common_tables import SimulationTable
 from ...simulation.forms.drive_tables import Initial, LoadTable
 from ...simulation.scenario.scenario import Scenario
+from ..duty_cycle import Rest, rests_of
 from ..required_motion import duty_torque, required_motion
 from .axis_task import AxisTask, reference_of, repeated, repeated_torque
 
@@ -88,17 +89,9 @@ class Cycles:
         return self.reference.at(self.time[self.last])[0]
 
     @cached_property
-    def rests(self) -> list[tuple[float, float, slice]]:
-        """Rests after the moves of the last cycle: direction and end [s] of the move, and the samples of the rest."""
-        time, intervals, moves = self.time[self.last], self.reference.intervals(), self.reference.moves
-        positions, found = [self.reference.start, *(move.to for move in moves)], []
-        for k in range(len(moves) - len(moves) // self.count, len(moves)):
-            end, step = intervals[k][1], positions[k + 1] - positions[k]
-            following = intervals[k + 1][0] if k + 1 < len(moves) else time[-1]
-            first, behind = np.searchsorted(time, end), np.searchsorted(time, following, side="right")
-            if first < behind and step != 0.0:
-                found.append((math.copysign(1.0, step), end, slice(int(first), int(behind))))
-        return found
+    def rests(self) -> list[Rest]:
+        """Rests after the moves of the last cycle."""
+        return rests_of(self.reference, self.time[self.last], len(self.reference.moves) // self.count)
 
 
 def last_cycle(samples: int, count: int, back: int = 1) -> slice:

@@ -12,7 +12,7 @@ from ...model.motor import Motor
 from ...simulation.forms.slide_units import of_slides
 from ...simulation.runs.results import RunArrays
 from ...simulation.scenario.scenario import Scenario
-from ..duty_cycle import DutyCycle
+from ..duty_cycle import DutyCycle, after_moves
 from ..motor_check import rms_rise
 from ..thermal import TwoBodies
 from .candidate_scenario import Cycles, last_cycle
@@ -211,17 +211,8 @@ def _gains(scenario: Scenario) -> dict[str, float]:
 
 def _at_rest(cycles: Cycles, error: np.ndarray) -> dict[str, float]:
     """Settling time, reversal error and error at rest, from the rests after the moves of the last cycle."""
-    window, time = cycles.task.settling_window, cycles.time[cycles.last]
-    ends: dict[float, list[float]] = {1.0: [], -1.0: []}
-    settling = [0.0] if cycles.reference.moves and window is not None else [math.nan]
-    for direction, end, rest in cycles.rests:
-        ends[direction].append(float(error[rest][-1]))
-        if window is not None:
-            outside = np.flatnonzero(np.abs(error[rest]) > window)
-            if len(outside):
-                stays = rest.start + outside[-1] + 1
-                settling.append(float(time[stays] - end) if stays < rest.stop else math.inf)
-    both = ends[1.0] and ends[-1.0]
-    reversal = abs(float(np.mean(ends[1.0]) - np.mean(ends[-1.0]))) if both else math.nan
-    off = max((abs(x) for found in ends.values() for x in found), default=math.nan)
-    return {"reversal_error": reversal, "settling_time": max(settling), "rest_error": off}
+    window, asked = cycles.task.settling_window, cycles.reference.moves and cycles.task.settling_window is not None
+    settling, reversal = after_moves(cycles.rests, cycles.time[cycles.last], error, window or 0.0)
+    off = max((abs(float(error[rest][-1])) for _, _, rest in cycles.rests), default=math.nan)
+    slowest = max([0.0, *settling]) if asked else math.nan
+    return {"reversal_error": reversal, "settling_time": slowest, "rest_error": off}
