@@ -280,4 +280,4 @@ def test_a_motor_of_a_train_is_chosen_by_name() -> None:
     assert of_one["winding_temperature"].values == pytest.approx(expected["winding_temperature"].values, rel=1e-12)
     assert float(lm.sizing.motor_current(result, "two")["current"][0]) == pytest.approx(0.1 / 0.06)
     assert "motor: there are several motors; give one of one, two" in refused(lambda: lm.sizing.temperatures(result))
-    assert 'motor: "onw" is none of the motors; did you mean one?' in refused(lambda: lm.sizing.motor_current(result, "onw"))
+    assert 'motor: "onw" is none of the motors; the motors are one, two' in refused(lambda: lm.sizing.motor_current(result, "onw"))
