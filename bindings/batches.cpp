@@ -1,4 +1,4 @@
-#include "batches.hpp"
+#include "module.hpp"
 
 #include <cstring>
 #include <limits>

@@ -4,7 +4,6 @@
 #include <nanobind/stl/optional.h>
 
 #include <memory>
-#include <optional>
 #include <string>
 #include <tuple>
 #include <vector>
@@ -212,6 +211,7 @@ inline void bind_control(nb::module_& m) {
         .def_ro("motor", &BoundAxis::motor)
         .def_ro("position_shaft", &BoundAxis::position_shaft)
         .def_ro("speed_shaft", &BoundAxis::speed_shaft)
+        .def_ro("reference_shaft", &BoundAxis::reference_shaft)
         .def(
             "least_current",
             [](const BoundAxis& a, double torque) {

@@ -1,4 +1,4 @@
-#include "described.hpp"
+#include "module.hpp"
 
 #include <algorithm>
 #include <string_view>

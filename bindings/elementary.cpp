@@ -1,4 +1,4 @@
-#include "elementary.hpp"
+#include "module.hpp"
 
 #include <cmath>
 #include <limits>

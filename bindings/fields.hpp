@@ -3,11 +3,9 @@
 
 #include <functional>
 #include <initializer_list>
-#include <limits>
 #include <map>
 #include <optional>
 #include <string>
-#include <type_traits>
 #include <utility>
 
 #include "arrays.hpp"

@@ -1,8 +1,7 @@
 // Thin binding: the core as a Python module.
-#include "batches.hpp"
-#include "described.hpp"
+#include "module.hpp"
+
 #include "descriptions.hpp"
-#include "elementary.hpp"
 #include "joint_trains.hpp"
 #include "names.hpp"
 #include "responses.hpp"

@@ -1,9 +1,7 @@
 // Derivatives of runs of trains with respect to parameters.
 #pragma once
 
-#include <optional>
 #include <string>
-#include <tuple>
 #include <vector>
 
 #include "lostmotion/analysis/sensitive_run.hpp"
