@@ -6,6 +6,7 @@
 #include <initializer_list>
 #include <limits>
 
+#include "lostmotion/base/decimal.hpp"
 #include "lostmotion/model/shaft_angle.hpp"
 #include "random_trains.hpp"
 #include "recorded.hpp"
@@ -137,6 +138,11 @@ struct SteppingTally {
     double worst = 0.0;
 
     int failed() const { return wrong; }
+    std::string text() const {
+        return std::to_string(compared) + " trains compared, " + std::to_string(undecided) + " undecided, " +
+               std::to_string(open) + " whose break-away rigid bodies leave open; largest difference " +
+               general_text(worst, 3);
+    }
 };
 
 // The largest difference of a speed or twist between the exact run and stepping `coarse` and four times as often, and
@@ -290,6 +296,12 @@ struct SolverTally {
     double worst = 0.0;
 
     int failed() const { return wrong + jammed; }
+    std::string text() const {
+        const auto n = [](int count) { return std::to_string(count); };
+        return n(compared) + " trains compared, largest difference " + general_text(worst, 3) + "; " + n(undecided) +
+               " that the adaptive solver does not settle, " + n(forked) + " with two motions, " + n(outlasted) +
+               " that the adaptive solver follows for a time, " + n(jammed) + " that jam";
+    }
 };
 
 inline void compare_solvers(const RandomRun& r, const Control& control, double duration, SolverTally& tally,

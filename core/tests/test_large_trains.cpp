@@ -281,10 +281,7 @@ TEST_CASE("exact and adaptive solver agree on random trains of 9 to 40 shafts wi
         CAPTURE(n);
         compare_solvers(RandomRun(random, 40, 0.05, 9), {}, 0.05, tally, ("large 91 " + std::to_string(n)).c_str());
     }
-    MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst << "; " << tally.undecided
-                           << " that the adaptive solver does not settle, " << tally.forked << " with two motions, "
-                           << tally.outlasted << " that the adaptive solver follows for a time, " << tally.jammed
-                           << " that jam");
+    MESSAGE(tally.text());
     CHECK(tally.compared > share(25));
     CHECK(tally.wrong == 0);
 }

@@ -17,7 +17,6 @@ TEST_CASE("a free chain of four equal masses keeps swinging in each of its modes
         TrainRun run(t);
         const auto shape = [&](int s) { return std::cos(pi * mode * (s + 0.5) / n); };
         for (int s = 0; s < n; ++s) run.speed(s) = shape(s);
-        REQUIRE(run.begin());
         REQUIRE(run.run(3.0));
         const double omega = 2.0 * std::sqrt(k / J) * std::sin(0.5 * pi * mode / n);
         for (int s = 0; s < n; ++s)
@@ -34,7 +33,6 @@ TEST_CASE("a stiff coupling in a chain makes a difference that falls with its st
     two.gears[0].efficiencies = MeshEfficiency(0.6, -0.1);
     TrainRun reference(two);
     reference.inputs[0] = {{0.1}};
-    REQUIRE(reference.begin());
     REQUIRE(reference.run(0.5));
     double before = 0.0;
     for (const double k : {1e2, 1e3, 1e4}) {
@@ -48,7 +46,6 @@ TEST_CASE("a stiff coupling in a chain makes a difference that falls with its st
         TrainRun run(three);
         run.step = 2.5e-4;
         run.inputs[0] = {{0.1}};
-        REQUIRE(run.begin());
         REQUIRE(run.run(0.5));
         const double difference = std::fabs(run.speed(2) / reference.speed(1) - 1.0);
         // The rotor lags by T/k: first order in the compliance.
@@ -93,7 +90,6 @@ TEST_CASE("two motors on one ring: a bias keeps the play closed until the instan
     run.step = 2e-4;
     run.inputs[run.command(0)] = {{.value = bias, .slope = -rate}};
     run.inputs[run.command(1)] = {{-bias}};
-    REQUIRE(run.begin());
     REQUIRE(run.run(1.5));
     // All turn together with alpha = -i rate t/J; the first mesh carries i (bias - rate t) - i^2 J_M alpha. The swing
     // that the beginning of the ramp starts shifts the instant by 1/omega at most.

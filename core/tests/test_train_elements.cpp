@@ -90,7 +90,6 @@ TEST_CASE("the least motor torque that lowers a load on a self-locking worm is |
         run.inputs[run.load(1)] = {{-20.0}};
         run.now.memory[0] = -20.0;
         run.inputs[run.command(0)] = {{share * 0.2 * 20.0 / 50.0}};
-        REQUIRE(run.begin());
         REQUIRE(run.run(0.1));
         CHECK((run.speed(0) > 0.0) == (share > 1.0));
         CHECK((run.speed(0) == 0.0) == (share < 1.0));
@@ -116,8 +115,6 @@ TEST_CASE("two rigid stages are one of the product ratio, losses included") {
         a.speed(1) = b.speed(2) = 2.0;
         b.speed(1) = 6.0;
         a.inputs[0] = b.inputs[0] = {{torque}};
-        REQUIRE(a.begin());
-        REQUIRE(b.begin());
         REQUIRE(a.run(0.3));
         REQUIRE(b.run(0.3));
         CHECK(a.speed(0) == doctest::Approx(b.speed(0)).epsilon(1e-13));
@@ -134,7 +131,6 @@ TEST_CASE("stick-slip under a drive of constant speed has its closed form") {
     t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {k}))};
     TrainRun run(t);
     run.speed(0) = v;
-    REQUIRE(run.begin());
     REQUIRE(run.run(3.0));
     const double omega = std::sqrt(k / J), slip = (2.0 * pi - 2.0 * std::atan((T_S - T_C) / (v * J * omega))) / omega,
                  stick = 2.0 * (T_S - T_C) / (k * v);
@@ -152,7 +148,6 @@ TEST_CASE("friction that falls with speed is followed from piece to piece") {
     t.shafts[0].friction.torques = {4.0, 1.0, 2.0};
     TrainRun run(t);
     run.speed(0) = 3.0;
-    REQUIRE(run.begin());
     REQUIRE(run.run(10.0));
     // J w' = -(a + b w): the time from one speed to another is J/b ln of the ratio of the torques.
     REQUIRE(run.events.size() == 2);
@@ -178,7 +173,6 @@ TEST_CASE("quadratic drag slows a shaft down as 1/t, to the stated error") {
     for (const double sign : {1.0, -1.0}) {
         TrainRun run(t);
         run.speed(0) = 20.0 * sign;
-        REQUIRE(run.begin());
         REQUIRE(run.run(2.0));
         // A difference of the torque moves the speed by its integral over J at most: drag pulls speeds together.
         CHECK(std::fabs(sign * run.speed(0) - 20.0 / (1.0 + c * 20.0 / J * 2.0)) < error / J * 2.0);
@@ -196,7 +190,6 @@ TEST_CASE("a clutch brings two shafts to one speed and slips again when asked fo
     const int u = run.assembly.places().couplings[0]->command;
     run.inputs[u] = {{0.0}, {.value = 0.5, .from = 1.0}};
     run.inputs[run.load(1)] = {{0.0}, {.slope = 2.0, .from = 4.0}};
-    REQUIRE(run.begin());
     REQUIRE(run.run(3.9));
     // T = 3 from t = 1: the speeds meet after 8/(3 (1 + 1/3)) = 2 s at 8 - 3 * 2 = 2 rad/s.
     REQUIRE(run.events.size() == 1);
@@ -263,7 +256,6 @@ TEST_CASE("a damper with a curve passes from piece to piece of its drag at the s
         t.dampers = {{"damper", 0, 1, 0.0, TorsionCurve({edge}, {steep, flat})}};
         TrainRun run(t);
         run.speed(0) = way * from;
-        REQUIRE(run.begin());
         REQUIRE(run.run(6.0));
         // J s' = -(flat s + c) down to the edge, then -steep s.
         const double c = (steep - flat) * edge, at = J / flat * std::log((flat * from + c) / (flat * edge + c));
@@ -330,7 +322,6 @@ TEST_CASE("a holding brake stops a shaft, holds its load and lets it go") {
     run.inputs[run.load(0)] = {{5.0}};
     run.inputs[run.assembly.places().acting[0]->command] = {
         {0.0}, {.value = 1.0, .from = 0.5}, {.value = 0.2, .from = 2.0}};
-    REQUIRE(run.begin());
     REQUIRE(run.run(2.5));
     // w' = -3 until 0.5 s, then -(1 + 10 + 5)/2 = -8: at rest after 4.5/8 s more.
     REQUIRE(run.events.size() == 1);
@@ -363,7 +354,6 @@ TEST_CASE("damped flanks part while they would pull, and fly through the gap") {
     t.gears[0].mesh_damping = c;
     TrainRun run(t);
     run.speed(0) = v;
-    REQUIRE(run.begin());
     REQUIRE(run.run(0.5));
     // x'' + 2 delta x' + k/J x = 0 from x = 0, x' = v: k x + c x' = 0 where tan(omega t) = -c omega/(k - c delta).
     const double delta = 0.5 * c / J, omega = std::sqrt(k / J - delta * delta);
@@ -421,7 +411,6 @@ TEST_CASE("a pendulum held by friction stays") {
     t.angle_torques = {{"gravity", 0, PeriodicCurve::sine(-25.0, 1, 0.0, 0.01)}};
     TrainRun run(t);
     run.shaft_angle(0) = 1.2;
-    REQUIRE(run.begin());
     REQUIRE(run.run(3.0));
     CHECK(run.speed(0) == 0.0);
     CHECK(run.shaft_angle(0) == 1.2);
@@ -472,7 +461,6 @@ TEST_CASE("a torque source gives its limit, no more") {
     t.motors[0].torque_limit = 3.0;
     TrainRun run(t);
     run.inputs[0] = {{.slope = 2.0}};
-    REQUIRE(run.begin());
     REQUIRE(run.run(4.0));
     // 2 t until 1.5 s, 3 from then on.
     REQUIRE(run.events.size() == 1);

@@ -207,38 +207,6 @@ TEST_CASE("accelerations of trains with housings that turn are those of Gauss's 
     CHECK(at_rest > 200);
 }
 
-TEST_CASE("exact and adaptive solver agree on random trains with housings that turn") {
-    RandomTrains random(62, true);
-    SolverTally tally;
-    for (int n = 0; n < 300; ++n) {
-        CAPTURE(n);
-        compare_solvers(random, 5, 0.5, tally);
-    }
-    MESSAGE(tally.compared << " trains compared, largest difference " << tally.worst);
-    CHECK(tally.compared > 280);
-    CHECK(tally.failed() == 0);
-}
-
-TEST_CASE("the laws that every run obeys hold with housings that turn") {
-    RandomTrains random(63, true);
-    LawTally tally;
-    for (int n = 0; n < 300; ++n) {
-        CAPTURE(n);
-        check_laws(random, 5, 0.4, tally);
-    }
-    MESSAGE(tally.runs << " trains; energies balance to " << tally.residual << " of what is turned over");
-    CHECK(tally.runs > 280);
-    CHECK(tally.failed() == 0);
-}
-
-TEST_CASE("time stepping converges to the exact run with housings that turn") {
-    RandomTrains random(64, true);
-    SteppingTally tally;
-    for (int n = 0; n < 40; ++n) compare_with_steps(random, 4, 0.4, 1000, tally);
-    CHECK(tally.compared > 30);
-    CHECK(tally.wrong == 0);
-}
-
 TEST_CASE("what is not possible with a housing that turns is refused in one line") {
     Train t;
     for (int s = 0; s < 3; ++s) t.shafts.push_back(shaft(1.0));

@@ -36,34 +36,24 @@ TEST_CASE("time stepping converges to the closed form of stick-slip and of a los
     CHECK(stops.speed[0] == 0.0);
 }
 
-TEST_CASE("the exact solver follows what time stepping converges to, on random trains of all elements") {
-    RandomTrains random(61);
-    SteppingTally tally;
-    for (int n = 0; n < cases(120); ++n) compare_with_steps(random, 4, 0.4, 1000, tally);
-    MESSAGE(tally.compared << " trains compared, " << tally.undecided << " undecided, " << tally.open
-                           << " whose break-away rigid bodies leave open; largest difference " << tally.worst);
-    CHECK(tally.compared > share(110));
-    CHECK(tally.wrong == 0);
-}
-
-TEST_CASE("the exact solver follows what time stepping converges to, on random trains with dampers") {
-    RandomTrains random(62, false, true);
-    SteppingTally tally;
-    for (int n = 0; n < 60; ++n) compare_with_steps(random, 4, 0.4, 1000, tally);
-    MESSAGE(tally.compared << " trains compared, " << tally.undecided << " undecided, " << tally.open
-                           << " whose break-away rigid bodies leave open; largest difference " << tally.worst);
-    CHECK(tally.compared > 55);
-    CHECK(tally.wrong == 0);
-}
-
-TEST_CASE("the exact solver follows what time stepping converges to, where the mesh stiffness steps over the angle") {
-    RandomTrains random(63, false, false, true);
-    SteppingTally tally;
-    for (int n = 0; n < 60; ++n) compare_with_steps(random, 3, 0.4, 1000, tally, std::to_string(n).c_str());
-    MESSAGE(tally.compared << " trains compared, " << tally.undecided << " undecided, " << tally.open
-                           << " whose break-away rigid bodies leave open; largest difference " << tally.worst);
-    CHECK(tally.compared > 50);
-    CHECK(tally.wrong == 0);
+TEST_CASE("the exact solver follows what time stepping converges to") {
+    struct Kind {
+        std::string what;
+        RandomTrains random;
+        int shafts, trains, least;
+    };
+    for (Kind k : {Kind{"all elements", RandomTrains(61), 4, cases(120), share(110)},
+                   Kind{"dampers", RandomTrains(62, false, true), 4, 60, 55},
+                   Kind{"mesh stiffness that steps over the angle", RandomTrains(63, false, false, true), 3, 60, 50},
+                   Kind{"housings that turn", RandomTrains(64, true), 4, 40, 30}}) {
+        CAPTURE(k.what);
+        SteppingTally tally;
+        for (int n = 0; n < k.trains; ++n)
+            compare_with_steps(k.random, k.shafts, 0.4, 1000, tally, (k.what + ' ' + std::to_string(n)).c_str());
+        MESSAGE(tally.text());
+        CHECK(tally.compared > k.least);
+        CHECK(tally.wrong == 0);
+    }
 }
 
 }  // namespace lostmotion::model

@@ -57,12 +57,14 @@ class TrainRun {
     int mode(int contact) const { return key.modes[contact]; }
 
     bool begin() {
+        begun_ = true;
         see_inputs(now.time);
         found = search.start(now, key);
         return found == Found::yes;
     }
-    // Runs to t_end; false if no regime follows.
+    // Runs to t_end, from its start if it has not begun; false if no regime follows.
     bool run(double t_end) {
+        if (!begun_ && !begin()) return false;
         while (now.time < t_end && found == Found::yes) {
             double limit = t_end;
             for (const auto& pieces : inputs)
@@ -212,6 +214,7 @@ class TrainRun {
     double gained = 0.0, turned_over = 0.0, least_loss = 0.0;  // [J]
 
  private:
+    bool begun_ = false;
     std::unordered_map<Key, std::unique_ptr<Regime>, KeyHash> regimes_;
 };
 
