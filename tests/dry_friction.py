@@ -1,24 +1,14 @@
 """Logs of one shaft with dry and viscous friction under a held torque, by the closed form of its motion."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 
 import numpy as np
 
 RIG = """
-[shafts.c]
-viscous_friction = 0.02
-friction_torque = 0.1
-[motors.m]
-shaft = "c"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 5e-3
-[simulation]
-duration = "1 s"
-sample_interval = "5 ms"
+shafts.c = { viscous_friction = 0.02, friction_torque = 0.1 }
+motors.m = { shaft = "c", kind = "torque_source", rated_torque = 1.0, rotor_inertia = 5e-3 }
+simulation = { duration = "1 s", sample_interval = "5 ms" }
 """
 TASK = """
 scenario = "rig.toml"

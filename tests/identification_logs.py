@@ -1,7 +1,5 @@
 """Logs of a virtual servo with a pendulum, for the tests of identification."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -74,33 +72,15 @@ def write_servo_logs(directory: Path, values: dict[str, float], *, rung: int, se
 
 
 AXIS = """
-[slides.carriage]
-viscous_friction = 200.0
-friction_force = 20.0
-force = { mean = 0.0 }
-[linear_motors.drive]
-slide = "carriage"
-rated_force = 1.0
-mass = "95 kg"
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
+slides.carriage = { viscous_friction = 200.0, friction_force = 20.0, force = { mean = 0.0 } }
+linear_motors.drive = { slide = "carriage", rated_force = 1.0, mass = "95 kg" }
+simulation = { duration = "1 s", sample_interval = "1 ms" }
 """
 SPRING = """
-[shafts.carriage]
-viscous_friction = 20.0
-torque = { mean = 0.0 }
-[springs.rail]
-shaft = "carriage"
-stiffness = { kind = "linear", stiffness = 900.0 }
-[motors.drive]
-shaft = "carriage"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = "95 kg*m^2"
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
+shafts.carriage = { viscous_friction = 20.0, torque = { mean = 0.0 } }
+springs.rail = { shaft = "carriage", stiffness = { kind = "linear", stiffness = 900.0 } }
+motors.drive = { shaft = "carriage", kind = "torque_source", rated_torque = 1.0, rotor_inertia = "95 kg*m^2" }
+simulation = { duration = "1 s", sample_interval = "1 ms" }
 """
 POSITION_NOISE = 2e-5  # m
 MASS, FRICTION, STIFFNESS = 95.0, 20.0, 900.0

@@ -67,6 +67,10 @@ def test_an_actuator_is_judged_at_its_output():
     assert 1.0 + gearbox.losses.core()(1.0, 1.0) == pytest.approx(1.0 / 0.97, rel=1e-9)
     assert np.abs(Axes(task_of(ARM)).motion(np.zeros(1)).torque).max() == pytest.approx(peak, rel=1e-4)
     assert found["inertia_ratio"].use == pytest.approx(0.08 / (81.0 * 2.6e-4) / 10.0, rel=1e-9)
+    study = task_of({**ARM, "actuator": {"efficiency": 0.8, "rotor_inertia": "1e-4 kg m^2"}})  # printed, and a value beside
+    assert study.part("gearbox", np.array([0.0])).loss_range is None
+    motor = study.part("motor", np.array([0.0]))
+    assert (motor.rated_torque, motor.rotor_inertia) == pytest.approx((9.0 / (9.0 * 0.8), 1e-4))
 
 
 def test_actuators_stand_beside_pairs_and_run():
@@ -100,14 +104,6 @@ def test_other_threads_may_add_parts_while_the_range_of_losses_is_judged():
     assert "holds" in axes.verdict_at_ends(row, ())
 
 
-def test_a_printed_efficiency_and_values_beside():
-    study = task_of({**ARM, "actuator": {"efficiency": 0.8, "rotor_inertia": "1e-4 kg m^2"}})
-    assert study.part("gearbox", np.array([0.0])).loss_range is None
-    motor = study.part("motor", np.array([0.0]))
-    assert motor.rated_torque == pytest.approx(9.0 / (9.0 * 0.8))
-    assert motor.rotor_inertia == pytest.approx(1e-4)
-
-
 # --- brakes ---
 
 
@@ -127,16 +123,17 @@ def test_a_brake_by_name(brake: Any):
     torque = 1.5 if isinstance(brake, str) else 0.1
     assert torque * rules(study, 1)["holding_brake"].use == pytest.approx(2.0 * G * 0.2 * math.sin(1.0) / 20.0, rel=1e-9)
     assert study.part("motor", np.array([1.0])).rotor_inertia == pytest.approx(1.74e-4 + 5.8e-6)
+    schema = drive_schema()  # for editors
+    table = {"properties": {"task": schema["properties"]["task"]}, "$defs": schema["$defs"]}
+    for of_task, valid in ((brake, True), ("of the motor", True), ({"torque": 1.0}, True), (3, False)):
+        assert jsonschema.Draft202012Validator(table).is_valid({"task": {"brake": of_task}}) == valid
 
 
 def test_the_drive_check_judges_a_brake_and_an_amplifier():
     plain = lm.load("catalogue-robot-joint")
-    scenario = plain.replace(
-        **{
-            "task.brake": {"torque": "0.5 N m", "inertia": "1e-6 kg m^2"},
-            "task.amplifier": {"continuous_current": "2 A", "peak_current": "3 A", "peak_time": "1 s"},
-        }
-    )
+    brake = {"torque": "0.5 N m", "inertia": "1e-6 kg m^2"}
+    amplifier = {"continuous_current": "2 A", "peak_current": "3 A", "peak_time": "1 s"}
+    scenario = plain.replace(**{"task.brake": brake, "task.amplifier": amplifier})
     findings = {f.what: f for f in lm.check_drive(scenario)}
     loads = [abs(float(x)) for x in (lm.simulate(scenario)["load_torque"].max(), lm.simulate(scenario)["load_torque"].min())]
     brake = findings["torque that the holding brake carries"]
@@ -157,13 +154,6 @@ def test_the_drive_check_of_an_axis_names_the_keys_of_its_file():
     assert "motors." not in said
     assert "screws." not in said
     assert next(f for f in findings if f.rule == "amplifier_current").verdict == "unknown"
-
-
-@pytest.mark.parametrize(("brake", "valid"), [("of the motor", True), ({"from": "x"}, True), ({"torque": 1.0}, True), (3, False)])
-def test_the_schema_for_editors_takes_a_brake_by_name(brake: Any, valid: bool):
-    schema = drive_schema()
-    table = {"properties": {"task": schema["properties"]["task"]}, "$defs": schema["$defs"]}
-    assert jsonschema.Draft202012Validator(table).is_valid({"task": {"brake": brake}}) == valid
 
 
 # --- amplifiers ---
@@ -197,9 +187,6 @@ def test_the_peak_current_of_the_amplifier_limits_the_loops():
     torque = Axes(study).gearbox(row)[0].motor_torque(motor)
     peak = np.abs(torque).max() / motor.limits.torque_constant
     assert rules(study)["amplifier_peak"].use == pytest.approx(peak / 3.0, rel=1e-9)
-
-
-def test_an_amplifier_by_name_and_the_older_key():
     tables = {**task(amplifier="tg-drives-tgz-s-400-7-15", supply={"max_voltage": "565 V"}), **JOINT}
     amplifier = task_of(tables).axis.amplifier
     assert (amplifier.continuous_current, amplifier.peak_current, amplifier.peak_time) == (7.0, 15.0, 5.0)

@@ -1,7 +1,5 @@
 """Drive trains: scenario files in the long form, what is refused, and the short form as a train."""
 
-from __future__ import annotations
-
 import copy
 import json
 import math
@@ -20,7 +18,7 @@ from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.initial_state import start_values
 from lostmotion.simulation.forms.key_aliases import DRIVE
 from lostmotion.simulation.forms.train_tables import TrainTables, train_schema
-from refusals import refused, refuses
+from refusals import refused
 
 TRAIN: dict[str, Any] = {
     "shafts": {
@@ -136,19 +134,21 @@ def test_what_is_wrong_with_a_train_is_said_in_one_line(file: Path, change: str,
     assert refused(lambda: lm.load(file, [change])) == f"{file}: {line}"
 
 
-def test_rigid_gears_in_a_loop_are_refused_with_their_key() -> None:
-    rigid = {"input": "motor", "output": "table", "ratio": 100.0}
+def test_tables_that_make_no_train_are_refused_with_their_keys() -> None:
+    arm = {"shaft": "table", "mass": 1.0, "radius": 0.1}
+    torques = {"gravity": {"arm": arm}, "angle_torques": {"arm": {"kind": "sine", "shaft": "table", "amplitude": 0.1}}}
+    refused(lambda: lm.Scenario(**TRAIN | torques), "gravity.arm", "angle_torques.arm")
+    refused(lambda: lm.Scenario(**TRAIN | {"shafts": TRAIN["shafts"] | {"my shaft": {"inertia": 1}}}), "shafts")
     gears = {name: gear | {"stiffness": {"kind": "rigid"}} for name, gear in TRAIN["gears"].items()}
-    with refuses("gears.direct", match=r"^key gears.direct: closes a loop of rigid gears with the same ratio"):
-        lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid}})
-    with refuses("gears.direct", match=r"^key gears.direct: closes a loop of rigid gears with another ratio: nothing"):
-        lm.Scenario(**TRAIN | {"gears": gears | {"direct": rigid | {"ratio": 90.0}}})
-
-
-def test_rigid_gears_bind_the_speeds_at_the_start() -> None:
-    gears = {"gears.belt.stiffness": {"kind": "rigid"}}
-    assert train(**gears, **{"initial.speeds": {"motor": 4.0, "worm": 2.0}})
-    refused(lambda: train(**gears, **{"initial.speeds": {"motor": 5.0, "worm": 2.0}}), "initial.speeds.worm")
+    for ratio, loop in ((100.0, "with the same ratio"), (90.0, "with another ratio: nothing")):
+        both = gears | {"direct": {"input": "motor", "output": "table", "ratio": ratio}}
+        message = f"^key gears.direct: closes a loop of rigid gears {loop}"
+        refused(lambda both=both: lm.Scenario(**TRAIN | {"gears": both}), "gears.direct", match=message)
+    rigid = {"gears.belt.stiffness": {"kind": "rigid"}}  # binds the speeds at the start
+    assert train(**rigid, **{"initial.speeds": {"motor": 4.0, "worm": 2.0}})
+    refused(lambda: train(**rigid, **{"initial.speeds": {"motor": 5.0, "worm": 2.0}}), "initial.speeds.worm")
+    refused(lambda: lm.response.rigid_constants(train()), "brakes.hold")
+    refused(lambda: lm.test_rig.TestRig(train()), match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears")
 
 
 def test_a_rigid_gear_on_a_housing_binds_three_speeds_at_the_start() -> None:
@@ -171,20 +171,6 @@ def test_angles_at_the_start_follow_through_the_gears() -> None:
     assert start["motor_angle"] == pytest.approx(2.0 * (10.0 + 0.1), rel=1e-14)
     assert start["table_angle"] == pytest.approx(10.0 / 50.0 - 0.02, rel=1e-14)
     refused(lambda: train(**{"initial.angles": {"motor": 1.0, "table": 0.2}}), "initial.angles.table")
-
-
-def test_gravity_and_a_torque_over_angle_need_names_of_their_own() -> None:
-    torques = {
-        "gravity": {"arm": {"shaft": "table", "mass": 1.0, "radius": 0.1}},
-        "angle_torques": {"arm": {"kind": "sine", "shaft": "table", "amplitude": 0.1}},
-    }
-    with refuses("gravity.arm", "angle_torques.arm"):
-        lm.Scenario(**TRAIN | torques)
-
-
-def test_a_name_that_no_variable_can_have_is_refused() -> None:
-    with refuses("shafts"):
-        lm.Scenario(**TRAIN | {"shafts": TRAIN["shafts"] | {"my shaft": {"inertia": 1}}})
 
 
 def test_records_of_the_catalogue_fit_at_any_place(file: Path) -> None:
@@ -230,16 +216,13 @@ def test_a_series_may_load_a_shaft(file: Path) -> None:
     assert samples.values == pytest.approx((0.0, 0.5))
 
 
-def test_the_schema_knows_every_table() -> None:
-    assert set(TrainTables.model_fields) < set(train_schema()["properties"])
-
-
 def test_the_schema_of_files_holds_all_forms() -> None:
     schema = file_schema()
     assert [form["title"] for form in schema["anyOf"]] == ["Scenario", "Drive train", "Linear axis"]
     named = set(re.findall(r'"#/\$defs/([^"]*)"', json.dumps(schema)))
     assert named <= set(schema["$defs"])
     assert {"Motor", "train_ShaftMotor"} <= named
+    assert set(TrainTables.model_fields) < set(train_schema()["properties"])
 
 
 # --- elements ---
@@ -303,34 +286,11 @@ def test_a_drive_is_a_train_of_two_shafts(path: Path) -> None:
     assert lm.Scenario.from_json(long.to_json()) == long
 
 
-@pytest.mark.parametrize("path", TRAINS, ids=lambda p: p.stem)
-def test_shipped_trains_load_and_survive_json(path: Path) -> None:
-    scenario = lm.load(path)
-    assert scenario.form != DRIVE
-    assert lm.Scenario.from_json(scenario.to_json()) == scenario
-    assert lm.load(path.stem) == scenario
-
-
-def test_what_takes_one_gear_or_linear_friction_alone_says_so() -> None:
-    refused(lambda: lm.response.rigid_constants(train()), "brakes.hold")
-    refused(lambda: lm.test_rig.TestRig(train()), match=r"gearbox: .* the test rig measures one gear; give one, such as scenario.gears")
-
-
 # --- runs ---
 
-SHARED = {
-    "command": "motor_command",
-    "load_torque": "load_load_torque",
-    "motor_torque": "motor_torque",
-    "motor_speed": "motor_speed",
-    "load_speed": "load_speed",
-    "load_angle": "load_angle",
-    "twist": "gearbox_twist",
-    "output_torque": "gearbox_output_torque",
-    "input_contact": "motor_contact",
-    "twist_contact": "gearbox_twist_contact",
-    "load_contact": "load_contact",
-}
+SHARED = {"command": "motor_command", "load_torque": "load_load_torque", "twist": "gearbox_twist", "output_torque": "gearbox_output_torque"}
+SHARED |= {"input_contact": "motor_contact", "twist_contact": "gearbox_twist_contact"}
+SHARED |= {name: name for name in ("motor_torque", "motor_speed", "load_speed", "load_angle", "load_contact")}
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
@@ -358,6 +318,8 @@ def test_the_short_and_the_long_form_give_the_same_bits(path: Path) -> None:
 @pytest.mark.parametrize("path", TRAINS, ids=lambda p: p.stem)
 def test_shipped_trains_run_and_their_energy_balance_closes(path: Path) -> None:
     scenario = lm.load(path)
+    assert scenario.form != DRIVE
+    assert lm.Scenario.from_json(scenario.to_json()) == scenario == lm.load(path.stem)
     result = lm.simulate(scenario)
     ledger = lm.energy_of(result)
     assert abs(ledger["residual"]) <= 1e-9 * ledger["turned_over"]
@@ -388,33 +350,13 @@ def test_a_saved_result_of_a_train_is_read_back_and_run_again(tmp_path: Path, en
     assert halved.gears["belt"].ratio == 1.0
 
 
-def test_losses_of_a_gear_on_a_turning_housing_are_apart_from_those_of_a_shaft_of_its_name(tmp_path: Path) -> None:
-    path = tmp_path / "planetary.toml"
-    path.write_text(
-        """
-[shafts.a]
-inertia = 0.1
-viscous_friction = 0.5
-[shafts.b]
-inertia = 0.2
-[shafts.r]
-inertia = 0.3
-[motors.m]
-kind = "torque_source"
-shaft = "a"
-rotor_inertia = 1e-4
-[gears.a]
-input = "a"
-output = "b"
-housing = "r"
-ratio = 2
-viscous_friction = 0.3
-[command.m]
-mean = 0.2
-[simulation]
-duration = 1
-sample_interval = 0.1
-"""
+def test_losses_of_a_gear_on_a_turning_housing_are_apart_from_those_of_a_shaft_of_its_name() -> None:
+    scenario = lm.Scenario(
+        shafts={"a": {"inertia": 0.1, "viscous_friction": 0.5}, "b": {"inertia": 0.2}, "r": {"inertia": 0.3}},
+        motors={"m": {"kind": "torque_source", "shaft": "a", "rotor_inertia": 1e-4}},
+        gears={"a": {"input": "a", "output": "b", "housing": "r", "ratio": 2, "viscous_friction": 0.3}},
+        command={"m": 0.2},
+        simulation={"duration": 1, "sample_interval": 0.1},
     )
-    energy = lm.energy_of(lm.simulate(lm.load(path)))
+    energy = lm.energy_of(lm.simulate(scenario))
     assert abs(energy["residual"]) < 1e-12 * energy["turned_over"]

@@ -1,7 +1,5 @@
 """Public functions take every scenario, in each form in which it can be written, or refuse it for a physical reason."""
 
-from __future__ import annotations
-
 import random
 import re
 from collections.abc import Callable, Iterator, Mapping
@@ -53,17 +51,10 @@ def stepped_together(scenario: lm.Scenario, _: Path) -> None:
     batch.step(**dict.fromkeys(batch.inputs, 0.1))
 
 
-def studied(scenario: lm.Scenario, path: Path) -> None:
-    vary = {"key": next(inertias(scenario)), "relative": True, "values": [1.0, 1.01]}
-    what = lm.studies.Study(scenario=scenario, vary=[vary], keep={"largest": f"peak({scenario.variables()[0].name})"})
-    lm.study(what, path / "study", threads=1)
-
-
-def judged(scenario: lm.Scenario, path: Path) -> None:
+def studied(scenario: lm.Scenario, path: Path, **more: Any) -> None:
     vary = {"key": next(inertias(scenario)), "relative": True, "values": [1.0, 1.01]}
     keep = {"largest": f"peak({scenario.variables()[0].name})"}
-    what = lm.studies.Study(scenario=scenario, vary=[vary], keep=keep, select={"objectives": {"largest": "least"}})
-    lm.study(what, path / "study", threads=1)
+    lm.study(lm.studies.Study(scenario=scenario, vary=[vary], keep=keep, **more), path / "study", threads=1)
 
 
 def rig_of(scenario: lm.Scenario, path: Path, **more: Any) -> tuple[Rig, list[Prepared]]:
@@ -139,7 +130,7 @@ FUNCTIONS: dict[str, Callable[[lm.Scenario, Path], Any]] = {
     "rigid_constants": lambda s, _: lm.response.rigid_constants(s),
     "reduce": lambda s, _: lm.mujoco.reduce(s, 0.5, 1.0),
     "frequency_response": lambda s, _: lm.frequency_response(s, [2.0], 0.2, max_periods=5),
-    "select": judged,
+    "select": lambda s, path: studied(s, path, select={"objectives": {"largest": "least"}}),
     "commission": lambda s, _: lm.commission(s),
     "hunting_certificate": lambda s, _: lm.hunting_certificate(s),
     "limit_cycle": lambda s, _: lm.servo.limit_cycle(s, causes=False),
@@ -253,14 +244,9 @@ def train_of_couplings(r: random.Random) -> dict[str, Any]:
     """Two motors that turn a drum by a limiter, a ratchet, a freewheel, a clutch or a damper each, with end stops and a brake."""
     shafts: dict[str, Any] = {"drum": {"inertia": 0.2, "friction_torque": 0.1, "torque": {"mean": -1.0}}}
     made: dict[str, Any] = {"shafts": shafts, "motors": {}, "command": {}, "gears": {}}
-    joints: list[tuple[str, dict[str, Any]]] = [
-        ("torque_limiters", {"release_torque": 3.0, "slip_torque": 1.0}),
-        ("ratchets", {"teeth": 12}),
-        ("freewheels", {}),
-        ("clutches", {"torque": 5.0, "kind": "friction"}),
-        ("dampers", {"viscous_friction": 0.3}),
-    ]
-    for k, (table, joint) in enumerate(r.sample(joints, 2)):
+    joints: dict[str, dict[str, Any]] = {"torque_limiters": {"release_torque": 3.0, "slip_torque": 1.0}, "ratchets": {"teeth": 12}}
+    joints |= {"freewheels": {}, "clutches": {"torque": 5.0, "kind": "friction"}, "dampers": {"viscous_friction": 0.3}}
+    for k, (table, joint) in enumerate(r.sample(list(joints.items()), 2)):
         shafts |= {f"rotor_{k}": {}, f"middle_{k}": {"inertia": 0.01}}
         made["motors"][f"m_{k}"] = {"shaft": f"rotor_{k}", "kind": "torque_source", "rated_torque": 1.0, "rotor_inertia": 1e-3}
         made["gears"][f"g_{k}"] = {"input": f"rotor_{k}", "output": f"middle_{k}", "ratio": r.choice([5.0, -7.0])}
@@ -309,13 +295,9 @@ def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed:
     motor, gear = (
         {key: v for key, v in tables[t][n].items() if key not in ("shaft", "input", "output")} for t, n in (("motors", "m"), ("gears", "g"))
     )
-    one = lm.Scenario(
-        motor=motor,
-        gearbox={"stiffness": {"kind": "rigid"}} | gear | {"inertia": tables["shafts"]["a"]["inertia"]},
-        load=tables["shafts"]["b"],
-        command=tables["command"]["m"],
-        simulation=tables["simulation"],
-    )
+    gear = {"stiffness": {"kind": "rigid"}} | gear | {"inertia": tables["shafts"]["a"]["inertia"]}
+    rest = {"load": tables["shafts"]["b"], "command": tables["command"]["m"], "simulation": tables["simulation"]}
+    one = lm.Scenario(motor=motor, gearbox=gear, **rest)
     scenario = lm.Scenario(**tables)
     drive, train = lm.simulate(one), lm.simulate(scenario)
     assert np.array_equal(drive["load_speed"], train["b_speed"])
@@ -351,11 +333,6 @@ def test_a_key_of_the_file_and_that_of_the_long_form_are_one(name: str, own: str
         assert study.vary[0].title == key
 
 
-def test_a_changed_axis_speaks_of_the_keys_of_its_file() -> None:
-    changed = lm.load("ball-screw-axis").replace(**{"axis.slide.mass": 21.0})
-    refused(lambda: changed.replace(**{"slides.slide.mass": -1.0}), "axis.slide.mass")
-
-
 def test_a_result_of_an_axis_has_the_tables_of_its_file(tmp_path: Path) -> None:
     axis = lm.Scenario(**axis_table(random.Random(3))).replace(**{"simulation.duration": 0.01})
     lm.save(lm.simulate(axis), tmp_path / "run.nc")
@@ -364,6 +341,7 @@ def test_a_result_of_an_axis_has_the_tables_of_its_file(tmp_path: Path) -> None:
     assert again.form == axis.form
     with pytest.raises(lm.InputError, match=r"axis\.motor\.limits\.torque_constant"):
         lm.sizing.motor_current(lm.open_result(tmp_path / "run.nc"))
+    refused(lambda: axis.replace(**{"slides.slide.mass": -1.0}), "axis.slide.mass")
     more = axis.replace(**{"shafts.motor.inertia": 1e-4})  # which a file of an axis cannot say
     assert lm.Scenario.from_json(more.to_json()).tables == more.tables
 

@@ -1,7 +1,5 @@
 """The live page: what Python writes into it. What it does in a browser is tested in page/tests."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json
@@ -55,6 +53,10 @@ def test_the_page_holds_the_core_and_the_scenario() -> None:
     described = description(page)
     assert described["title"] == scenario.title
     assert lm.Scenario(**described["scenario"]) == scenario
+    title = '</script><script>alert("1")</script><!--'  # ends no script that holds it
+    page = live_page.page(scenario.replace(title=title), "drive")
+    assert description(page)["title"] == title
+    assert page.count("<script") == SOURCE.count("<script")
 
 
 def test_a_page_holds_the_smallest_kernel_of_its_train() -> None:
@@ -76,31 +78,18 @@ def test_margins_are_those_of_the_servo_sheet() -> None:
 
 def test_moves_of_a_reference_can_be_changed() -> None:
     scenario = lm.load("hunting-with-backlash")
-    found = {key: s for key, s in sliders(scenario).items() if key.startswith("controller.reference.")}
-    assert list(found) == [
-        "controller.reference.moves.0.to",
-        "controller.reference.moves.1.to",
-        "controller.reference.speed",
-        "controller.reference.acceleration",
-        "controller.reference.jerk",
-        "controller.reference.dwell",
-    ]
-    assert found["controller.reference.moves.0.to"]["unit"] == "°"
-    assert found["controller.reference.speed"]["target"] == {"reference": 0, "path": ["moves", "speed"]}
-
-
-def test_what_follows_a_target_cannot_be_changed() -> None:
-    for name, controller in lm.load("direction-finder").axes().items():
+    prefix = "controller.reference."
+    found = {key.removeprefix(prefix): s for key, s in sliders(scenario).items() if key.startswith(prefix)}
+    assert list(found) == ["moves.0.to", "moves.1.to", "speed", "acceleration", "jerk", "dwell"]
+    assert found["moves.0.to"]["unit"] == "°"
+    assert found["speed"]["target"] == {"reference": 0, "path": ["moves", "speed"]}
+    for name, controller in lm.load("direction-finder").axes().items():  # what follows a target cannot be changed
         assert reference_view(controller.reference, 1.0) is None
         assert list(reference_sliders(controller, f"controllers.{name}.reference", "Reference", 0, 1.0)) == []
-
-
-@pytest.mark.usefixtures("built")
-def test_no_title_ends_the_script_that_holds_it() -> None:
-    title = '</script><script>alert("1")</script><!--'
-    page = live_page.page(lm.load("paper-2dof-nl-small", SHORT).replace(title=title))
-    assert description(page)["title"] == title
-    assert page.count("<script") == SOURCE.count("<script")
+    # A command without a sine or a step can get one with the keys that belong to it.
+    own = {s.key: s for s in of_signal(CommandSignal(mean=0.5), "command", "Command", "1", {"input": 0}, 1.1, 2.0)}
+    assert own["command.amplitude"].needs == {"command.frequency": 1.0}
+    assert own["command.steps.0.height"].needs == {"command.steps.0.time": 0.2}
 
 
 def test_without_a_built_page_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -147,23 +136,12 @@ def test_a_gap_can_be_opened_where_there_is_none() -> None:
     assert [s["key"] for s in found["sliders"]].count("gearbox.stiffness.backlash") == 1
 
 
-def test_a_command_without_a_sine_or_a_step_can_get_one_with_the_keys_that_belong_to_it() -> None:
-    found = {s.key: s for s in of_signal(CommandSignal(mean=0.5), "command", "Command", "1", {"input": 0}, 1.1, 2.0)}
-    assert found["command.amplitude"].needs == {"command.frequency": 1.0}
-    assert found["command.steps.0.height"].needs == {"command.steps.0.time": 0.2}
+def test_labels_belong_to_keys_of_scenario_files(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.syspath_prepend(ROOT / "docs")
+    import generate
 
-
-def test_labels_belong_to_keys_of_scenario_files() -> None:
-    known = (ROOT / "docs").joinpath("generate.py").parent
-    sys.path.insert(0, str(known))
-    try:
-        import generate
-
-        words = set(re.findall(r"`([\w.]+)`", generate.scenario_reference() + generate.train_reference()))
-    finally:
-        sys.path.remove(str(known))
-    for label in LABELS:
-        assert label.rpartition(".")[2] in {word.rpartition(".")[2] for word in words}, label
+    words = set(re.findall(r"`([\w.]+)`", generate.scenario_reference() + generate.train_reference()))
+    assert {label.rpartition(".")[2] for label in LABELS} <= {word.rpartition(".")[2] for word in words}
 
 
 @pytest.mark.usefixtures("built")

@@ -3,8 +3,6 @@
 The equations stand here as the examples' pages give them, with event logic of their own: nothing of the core is used.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Sequence
@@ -344,16 +342,9 @@ def test_coupled_clutches(peak: float) -> None:
 
 
 def friction(**tables: Any) -> lm.Scenario:
+    spring = {"ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": 160.0}, "mesh_damping": 1.0}
     return lm.Scenario(
-        gears={
-            "spring": {
-                "input": "inertia2",
-                "output": "inertia1",
-                "ratio": 1.0,
-                "stiffness": {"kind": "linear", "stiffness": 160.0},
-                "mesh_damping": 1.0,
-            }
-        },
+        gears={"spring": {"input": "inertia2", "output": "inertia1", **spring}},
         clutches={"clutch": {"input": "inertia3", "output": "inertia2", "torque": 80.0}},
         brakes={"brake": {"shaft": "inertia1", "torque": 800.0}},
         **tables,
@@ -420,24 +411,13 @@ def test_one_way_clutch() -> None:
 
 def test_lossy_gear_with_bearing_friction() -> None:
     """LossyGearDemo2: both may be stuck at once, so that their torques are not unique; the motion is."""
+    wave, losses = {"amplitude": 10.0, "frequency": 1.0, "phase": math.pi}, {"drive_efficiency": 0.5, "backdrive_efficiency": 0.5}
     scenario = lm.Scenario(
         shafts={
-            "a": {
-                "inertia": 1.0,
-                "friction_torque": 0.5,
-                "viscous_friction": 0.5,
-                "torque": {"amplitude": 10.0, "frequency": 1.0, "phase": math.pi},
-            },
+            "a": {"inertia": 1.0, "friction_torque": 0.5, "viscous_friction": 0.5, "torque": wave},
             "b": {"inertia": 1.5, "torque": {"mean": 10.0, "ramps": [{"rise": -5.0, "duration": 2.0}]}},
         },
-        gears={
-            "gear": {
-                "input": "a",
-                "output": "b",
-                "ratio": 2.0,
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.5, "backdrive_efficiency": 0.5},
-            }
-        },
+        gears={"gear": {"input": "a", "output": "b", "ratio": 2.0, "losses": {"kind": "mesh_efficiency", **losses}}},
         simulation=simulation(0.5, 1e-3),
     )
 
@@ -489,18 +469,10 @@ def test_elastic_backlash(limited: bool) -> None:
     """Backlash with ElastoBacklash2: the flanks push as spring and damper, and part where these would pull. With ElastoBacklash
     (limited) the torque of the damper is at most that of the spring as well."""
     J, c, d, half = 5.0, 2e4, 50.0, math.pi / 8.0
+    flanks = {"stiffness": {"kind": "curve", "backlash": 2.0 * half, "slopes": [c]}, "mesh_damping": d, "damping_limited": limited}
     scenario = lm.Scenario(
         shafts={"inertia": {"inertia": J, "torque": 0.0}, "wall": {"inertia": 1.0}},
-        gears={
-            "mesh": {
-                "input": "inertia",
-                "output": "wall",
-                "ratio": 1.0,
-                "stiffness": {"kind": "curve", "backlash": 2.0 * half, "slopes": [c]},
-                "mesh_damping": d,
-                "damping_limited": limited,
-            }
-        },
+        gears={"mesh": {"input": "inertia", "output": "wall", "ratio": 1.0, **flanks}},
         brakes={"ground": {"shaft": "wall", "torque": 1e6}},
         command={"ground": {"mean": 1.0}},
         initial={"twists": {"mesh": 0.5 * math.pi}},

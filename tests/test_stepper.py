@@ -123,11 +123,6 @@ def test_microsteps_have_the_error_of_the_table() -> None:
     assert stepping.table(counts) == pytest.approx([0.25 + 0.1, 0.5, 0.75 - 0.1, 0.5], abs=1e-15)
 
 
-def test_a_step_rate_beyond_that_of_the_driver_is_refused() -> None:
-    command = {"stepping": {"reference": {"moves": [{"to": 1.0}], "speed": 10.0, "acceleration": 1e3}, "max_step_rate": 300.0}}
-    refused(lambda: alone(command), "command.m")
-
-
 @pytest.mark.parametrize(
     ("change", "text"),
     [
@@ -145,10 +140,22 @@ def test_a_stepper_that_makes_no_sense_is_refused(change: dict, text: str) -> No
     refused(lambda: lm.Motor(**given), match=text)
 
 
-def test_keys_of_steppers_and_their_steps_belong_to_steppers() -> None:
-    assert 'only a motor of kind "stepper"' in refused(lambda: lm.Motor(kind="torque_source", rotor_inertia=1e-4, detent_torque=0.1))
-    stepping = {"stepping": {"pulses": {"times": [0.1, 0.2], "values": [1, 1]}}}
-    refused(lambda: lm.load("ball-screw-axis").without_controllers().replace(**{"command.motor": stepping}), "command")
+def test_what_turns_a_stepper_otherwise_is_refused() -> None:
+    steps = {"pulses": {"times": [0.1, 0.2], "values": [1, 1]}}
+    fast = {"reference": {"moves": [{"to": 1.0}], "speed": 10.0, "acceleration": 1e3}, "max_step_rate": 300.0}
+    tables = lm.load("speed-axis").written.model_dump(exclude_none=True) | {"motor": MOTOR}
+    refused(lambda: alone({"stepping": fast}), "command.m")
+    refused(lambda: lm.Scenario(**tables), "controller")
+    refused(lambda: lm.load("ball-screw-axis").without_controllers().replace(**{"command.motor": {"stepping": steps}}), "command")
+    refused(lambda: lm.Motor(kind="torque_source", rotor_inertia=1e-4, detent_torque=0.1), match='only a motor of kind "stepper"')
+    refused(lambda: CommandSignal(mean=0.1, stepping=steps), match="both turn the field")
+    refused(lambda: Stepping(reference=0.0, **steps), match="give one of reference, travel and")
+    unsupplied = lm.Motor(**{k: v for k, v in NEMA_17.items() if k != "supply_voltage"})
+    refused(lambda: lm.sizing.pull_out_torque(unsupplied, 400.0), "supply_voltage")
+    simulation = lm.Simulation(lm.load("stepper-belt-axis", {"axis.motor.standstill_current": 0.5}), step=1e-3)
+    refused(lambda: simulation.advance(0.01, command=0.01), match="motor_command, motor_current_command")
+    simulation.advance(0.5, motor_command=0.03, motor_current_command=1.0)
+    assert float(simulation["motor_angle"]) == pytest.approx(0.03, abs=2e-3)
 
 
 def test_current_is_reduced_after_the_delay() -> None:
@@ -161,13 +168,8 @@ def test_current_is_reduced_after_the_delay() -> None:
 
 SHORT = {
     "motor": {**MOTOR, "detent_torque": 0.01, "standstill_current": 0.5},
-    "gearbox": {
-        "ratio": 10.0,
-        "rated_input_speed": 300.0,
-        "rated_output_torque": 2.0,
-        "stiffness": {"kind": "linear", "stiffness": 200.0},
-        "losses": {"kind": "constant_efficiency", "efficiency": 0.9},
-    },
+    "gearbox": {"ratio": 10.0, "rated_input_speed": 300.0, "rated_output_torque": 2.0}
+    | {"stiffness": {"kind": "linear", "stiffness": 200.0}, "losses": {"kind": "constant_efficiency", "efficiency": 0.9}},
     "load": {"inertia": 2e-3, "viscous_friction": 0.02},
     "command": {"stepping": {"reference": {"moves": [{"to": 3.0}], "speed": 6, "acceleration": 200}, "microsteps": 16}},
     "simulation": {"duration": 0.7, "sample_interval": 1e-3},
@@ -200,19 +202,8 @@ def test_energy_of_a_run_that_loses_steps_closes() -> None:
     assert found.attrs["energy_residual"] < 1e-9
 
 
-def test_a_command_that_is_not_all_steps_is_refused() -> None:
-    assert "both turn the field" in refused(lambda: CommandSignal(mean=0.1, stepping={"pulses": {"times": [0.1, 0.2], "values": [1, 1]}}))
-    assert "give one of reference, travel and" in refused(lambda: Stepping(reference=0.0, pulses={"times": [0.1, 0.2], "values": [1, 1]}))
-
-
-NEMA_17 = {
-    **MOTOR,
-    "holding_torque": 0.44,
-    "rated_current": 1.7,
-    "resistance_phase": 1.5,
-    "inductance_phase": 2.8e-3,
-    "supply_voltage": 24.0,
-}
+NEMA_17 = MOTOR | {"holding_torque": 0.44, "rated_current": 1.7, "resistance_phase": 1.5}
+NEMA_17 |= {"inductance_phase": 2.8e-3, "supply_voltage": 24.0}
 
 
 def test_the_pull_out_torque_is_the_largest_of_all_currents_within_both_limits() -> None:
@@ -228,16 +219,10 @@ def test_the_pull_out_torque_is_the_largest_of_all_currents_within_both_limits()
         assert torque == pytest.approx(K * max(float(i.imag[within].max()), 0.0), abs=4.0 * K * size / 2000)
     assert found[0] == pytest.approx(0.44, rel=1e-15)
     assert np.all(np.diff(found) <= 0.0)
-
-
-def test_at_a_speed_with_plenty_of_current_the_pull_out_torque_is_the_closed_form() -> None:
-    """K (U/Z - K w R/Z^2) with Z^2 = R^2 + (n w L)^2, where the current is below its limit."""
-    w, K = 400.0, 0.44 / (math.sqrt(2.0) * 1.7)
-    Z = math.hypot(1.5, 50 * w * 2.8e-3)
-    motor = lm.Motor(**{**NEMA_17, "supply_voltage": 90.0})
-    expected = K * (90.0 / Z - K * w * 1.5 / Z**2)
-    assert float(lm.sizing.pull_out_torque(motor, w)) == pytest.approx(expected, rel=1e-14)
-    refused(lambda: lm.sizing.pull_out_torque(lm.Motor(**{k: v for k, v in NEMA_17.items() if k != "supply_voltage"}), w), "supply_voltage")
+    # Where the current is below its limit: K (U/Z - K w R/Z^2) with Z^2 = R^2 + (n w L)^2.
+    w, Z = 400.0, math.hypot(1.5, 50 * 400.0 * 2.8e-3)
+    plenty = lm.sizing.pull_out_torque(lm.Motor(**{**NEMA_17, "supply_voltage": 90.0}), w)
+    assert float(plenty) == pytest.approx(K * (90.0 / Z - K * w * 1.5 / Z**2), rel=1e-14)
 
 
 def test_lost_steps_are_those_of_an_integration_of_the_sine() -> None:
@@ -424,29 +409,14 @@ def test_the_live_page_draws_the_electrical_angle() -> None:
     assert not page["open_loop"]  # a field that swings by a radian is no command to draw a response of
 
 
-def test_step_by_step_the_field_and_the_current_are_named() -> None:
-    base = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", {"axis.motor.standstill_current": 0.5})
-    simulation = lm.Simulation(base, step=1e-3)
-    assert "motor_command, motor_current_command" in refused(lambda: simulation.advance(0.01, command=0.01))
-    simulation.advance(0.5, motor_command=0.03, motor_current_command=1.0)
-    assert float(simulation["motor_angle"]) == pytest.approx(0.03, abs=2e-3)
-
-
 def test_a_telescope_s_stepper_turns_its_axis_by_the_steps_that_its_controller_counts() -> None:
     """AstroEQ: 48 steps, 300:1 and 144:1. A step is 0.625 arcsec; at 15.041 arcsec/s the 24 that are due in the first second come each 41.55 ms."""
     arcsec = math.pi / 648_000.0
+    mesh = {"stiffness": {"kind": "linear", "stiffness": 2e4}, "mesh_damping": 200.0}
     scenario = lm.Scenario(
         shafts={"motor": {"inertia": 0.0, "viscous_friction": 2e-5}, "axis": {"inertia": 2.0}},
         motors={"ra": {**MOTOR, "shaft": "motor", "steps_per_revolution": 48, "holding_torque": 0.03, "rotor_inertia": 5e-7}},
-        gears={
-            "train": {
-                "input": "motor",
-                "output": "axis",
-                "ratio": 43200,
-                "stiffness": {"kind": "linear", "stiffness": 2e4},
-                "mesh_damping": 200.0,
-            }
-        },
+        gears={"train": {"input": "motor", "output": "axis", "ratio": 43200, **mesh}},
         command={"ra": {"stepping": {"reference": {"ramps": [{"duration": 1.0, "rise": 15.041 * arcsec}]}}}},
         simulation={"duration": 2.0, "sample_interval": 1e-3},
     )
@@ -480,9 +450,3 @@ def test_a_stuck_shaft_is_explained_by_its_field_and_has_no_dead_zone_of_command
     scenario = lm.load("stepper-belt-axis")
     response = lm.frequency_response(scenario, [5.0, 10.0], 0.01)
     assert "dead_zone_forward" not in lm.response.characteristics(response, scenario).attrs
-
-
-def test_a_loop_around_a_stepper_is_refused() -> None:
-    tables = lm.load("speed-axis").written.model_dump(exclude_none=True)
-    tables["motor"] = MOTOR
-    refused(lambda: lm.Scenario(**tables), "controller")
