@@ -1,11 +1,10 @@
-#include "module.hpp"
-
 #include <cstring>
 #include <limits>
 #include <optional>
 
 #include "lostmotion/batch/drive_batch.hpp"
 #include "lostmotion/batch/exact_batch.hpp"
+#include "module.hpp"
 #include "train.hpp"
 
 namespace lostmotion::binding {

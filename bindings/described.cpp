@@ -1,10 +1,9 @@
-#include "module.hpp"
-
 #include <algorithm>
 #include <string_view>
 
 #include "arrays.hpp"
 #include "lostmotion/scenario/law_fields.hpp"
+#include "module.hpp"
 
 namespace lostmotion::binding {
 

@@ -1,5 +1,3 @@
-#include "module.hpp"
-
 #include <cmath>
 #include <limits>
 
@@ -7,6 +5,7 @@
 #include "lostmotion/base/arctangent.hpp"
 #include "lostmotion/base/powers.hpp"
 #include "lostmotion/base/sine.hpp"
+#include "module.hpp"
 
 namespace lostmotion::binding {
 
