@@ -1,7 +1,5 @@
 """Controllers on a drive train, as the solver takes them."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import zlib

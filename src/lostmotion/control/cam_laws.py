@@ -5,8 +5,6 @@ A law is the shape of its acceleration over the first half of a move; the second
 acceleration by less than a thousandth of the peak.
 """
 
-from __future__ import annotations
-
 import itertools
 from collections.abc import Callable
 from functools import cache

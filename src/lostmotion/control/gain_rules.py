@@ -1,7 +1,5 @@
 """Rules for the gains of a servo cascade, as formulas: numbers in, numbers out, all at the motor."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

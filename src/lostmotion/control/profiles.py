@@ -6,8 +6,6 @@ is not reached, and needs no library. The tests compare it with Ruckig, which so
 acceleration at both ends, several axes.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 

@@ -1,7 +1,5 @@
 """Sample times of loops, which nest."""
 
-from __future__ import annotations
-
 from ..errors import InputError
 
 MAX_SAMPLES = 1_000_000  # of the shortest sample time in another

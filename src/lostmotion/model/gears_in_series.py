@@ -1,7 +1,5 @@
 """Compliances of gears in series, and the gear of ratio 1 that has none."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

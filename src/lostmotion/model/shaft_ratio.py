@@ -1,7 +1,5 @@
 """Speeds of shafts that gears and clutches tie to each other, and the ratio of the turns of two shafts."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Mapping
 
 from .train import DriveTrain

@@ -1,7 +1,5 @@
 """Causes of pointing errors, and the axis without each."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any, TypeVar
 

@@ -1,7 +1,5 @@
 """The same axes as they are on another day: with another target speed, temperature or wear, or under a controller that is wrong about them."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

@@ -1,7 +1,5 @@
 """The certificate of hunting as a page and as lines of text: verdict, limit cycles and the map from break-away to break-away."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Contours of a quantity over a grid at round values, for pages and pictures alike."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

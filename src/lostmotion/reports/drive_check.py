@@ -1,7 +1,5 @@
 """The report of a drive check: how much of each limit is used, and the rule behind each point."""
 
-from __future__ import annotations
-
 from ..sizing.finding import Findings
 from .page import Report, Table
 from .panels import Bars, Group

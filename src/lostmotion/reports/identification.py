@@ -1,7 +1,5 @@
 """The report of an identification: overlays, residuals, correlations, profiles, friction; tables as CSV."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

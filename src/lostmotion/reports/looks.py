@@ -3,8 +3,6 @@
 Pages, pictures and figures of the documentation take all colours from here.
 """
 
-from __future__ import annotations
-
 import re
 from importlib.resources import files
 from typing import Any

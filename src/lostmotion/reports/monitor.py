@@ -1,7 +1,5 @@
 """The page of a monitor: trends with intervals, the evidence of changes, and the values that each log determines."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

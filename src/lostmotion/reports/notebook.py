@@ -1,7 +1,5 @@
 """Results in notebooks: as the pages that the commands write of them."""
 
-from __future__ import annotations
-
 from importlib import import_module
 from types import ModuleType
 from typing import Any

@@ -1,7 +1,5 @@
 """The report of a stepper's axis, which has no loop: errors, lag of the rotor, stiffness, resonances, settling and lost steps."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

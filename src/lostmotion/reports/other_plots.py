@@ -1,7 +1,5 @@
 """Pictures of the charts that are not made of lines: bars, histograms, matrices, contacts, energy."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from itertools import pairwise
 from typing import Any

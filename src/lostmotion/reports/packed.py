@@ -1,7 +1,5 @@
 """The data of charts as a page carries them: binary arrays behind a header, compressed, as page/src/packed.ts reads them."""
 
-from __future__ import annotations
-
 import base64
 import gzip
 import json

@@ -1,7 +1,5 @@
 """Pages of results: a verdict, the figures that support it, tables with units. One self-contained file each, with its data."""
 
-from __future__ import annotations
-
 import re
 import shutil
 from collections.abc import Mapping, Sequence

@@ -1,7 +1,5 @@
 """Files that commands write: self-contained HTML pages, data of charts and tables as CSV, pictures on request."""
 
-from __future__ import annotations
-
 import csv
 import io
 from collections.abc import Callable, Iterable, Sequence

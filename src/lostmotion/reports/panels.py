@@ -1,7 +1,5 @@
 """Content of a figure before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws them as pictures."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

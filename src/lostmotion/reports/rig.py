@@ -1,7 +1,5 @@
 """The report of the virtual test rig: the data sheet on the left, what is measured on the right."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The report of a screw on the virtual test rig."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The data of a data sheet as rows of text, in the units that data sheets use."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ..data_sheets.accessory_sheets import AmplifierSheet

@@ -1,7 +1,5 @@
 """Frequency response of closed loops: what controllers and drive do under a sine of a reference or a load."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator, Sequence

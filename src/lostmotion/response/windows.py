@@ -1,7 +1,5 @@
 """Instants of a sine whose periods fit the sample times of controllers."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

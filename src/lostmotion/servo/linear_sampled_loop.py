@@ -6,8 +6,6 @@ Both together are linear and repeat after the sample time of the outermost loop 
 time-invariant system, from whose samples all is computed; nothing is averaged or approximated.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property

@@ -1,7 +1,5 @@
 """Bandwidths and margins of a sampled loop, from its exact frequency response."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace

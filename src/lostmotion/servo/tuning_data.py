@@ -1,7 +1,5 @@
 """Data of an axis for the tuning rules: inertias, stiffness and lags."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

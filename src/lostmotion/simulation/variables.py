@@ -1,7 +1,5 @@
 """The one list of result variables. Everything that names a variable is made from it."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 

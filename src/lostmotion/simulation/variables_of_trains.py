@@ -1,7 +1,5 @@
 """The result variables of a drive train: the channels of the core, named after the elements, and what follows from them."""
 
-from __future__ import annotations
-
 from collections.abc import Collection, Container, Iterator, Mapping
 from typing import Any
 

@@ -3,8 +3,6 @@
 A rule whose datum is missing gives the verdict "unknown" with the key that would give it, and never passes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import replace

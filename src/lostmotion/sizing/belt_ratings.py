@@ -1,7 +1,5 @@
 """Ratings of toothed belts by profile and width, where a table gives none of its own."""
 
-from __future__ import annotations
-
 import math
 import re
 from functools import cache

@@ -3,8 +3,6 @@
 They know nothing of tasks and records; `axis_rules` compares what they give with the data of parts.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

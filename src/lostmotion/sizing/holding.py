@@ -1,7 +1,5 @@
 """Does the load stay where it is without power? Judged by runs with command 0, from rest and from motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass

@@ -1,7 +1,5 @@
 """Nominal life of gearboxes and screws: the formulas of standards and catalogues, and the life of a part in its cycle."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

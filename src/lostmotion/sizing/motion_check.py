@@ -1,7 +1,5 @@
 """The check of the motion of a drive: inertia ratio, resonance, end stops."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The check of a motor: speed, heat, voltage, current."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,7 +1,5 @@
 """The check of a drive without power: whether the loads of a run move it, and whether the brake holds them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

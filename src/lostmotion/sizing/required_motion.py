@@ -1,7 +1,5 @@
 """Demands of a periodic motion on a motor and a gearbox, before any run: all compliance left out, the reference followed exactly."""
 
-from __future__ import annotations
-
 import itertools
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Rules for a train that is one axis: a motor that moves one load, through gears, a screw, a rack or a belt in a chain."""
 
-from __future__ import annotations
-
 from ..model.gears_in_series import DIRECT
 from ..model.shaft_ratio import turns
 from ..simulation.runs.results import RunArrays

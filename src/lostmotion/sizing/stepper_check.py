@@ -1,7 +1,5 @@
 """The check of a stepper: lost steps, torque against the pull-out curve, resonance."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

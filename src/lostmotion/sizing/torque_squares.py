@@ -4,8 +4,6 @@ Between switchings, input breakpoints and sample instants of controllers the tor
 Gauss-Kronrod pair of 3 and 7 points, at instants that a run of their own records. Where both rules differ, the piece is halved.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterable

@@ -1,7 +1,5 @@
 """Drives that are one record: an actuator, and a linear motor as a motor and a gearbox of ratio 1 in units of translation."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from typing import Annotated, Any

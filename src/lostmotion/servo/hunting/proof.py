@@ -5,8 +5,6 @@ With ``T_S = T_C`` the map is a fixed share of the error, the same for all: it i
 motion that begins in the band ever rests.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from dataclasses import dataclass, field

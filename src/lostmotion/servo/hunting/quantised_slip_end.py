@@ -4,8 +4,6 @@ Once the speed exceeds what all readings to come can take from it, slip and cont
 bounded disturbance. Its effect on an output is at most the sum of the magnitudes of the responses to each reading.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 import numpy as np

@@ -6,8 +6,6 @@ the last few readings end at the reference. If ``T_S > T_C``, a band of errors t
 as with a continuous controller. A band of few readings is followed reading by reading, a wider one by intervals.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator, Sequence

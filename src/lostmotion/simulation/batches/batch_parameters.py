@@ -1,7 +1,5 @@
 """Parameters of the drives of a batch, which may be written between steps."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 

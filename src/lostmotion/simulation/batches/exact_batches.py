@@ -1,7 +1,5 @@
 """Trains of a batch that the general solver steps, each by itself."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -3,8 +3,6 @@
 Sampled controllers run at their sample instants, between which the walk steps.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from functools import partial
 from typing import Any

@@ -1,7 +1,5 @@
 """The short form of a linear axis: motor, gearbox if there is one, screw, rack or belt, and slide, in the table `axis`."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from copy import deepcopy

@@ -1,7 +1,5 @@
 """Values of a scenario by dotted key, as `--set` names them."""
 
-from __future__ import annotations
-
 import re
 import tomllib
 from collections.abc import Iterable, Iterator, Mapping, Sequence

@@ -1,7 +1,5 @@
 """The short form of a drive with what only drive trains have: continuous controllers, given motion, end stops, flanks that strike."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -1,7 +1,5 @@
 """Motions that are given: of a scenario as signals of speed and acceleration, of a step of a simulation by its end."""
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping

@@ -1,7 +1,5 @@
 """Keys of the long form, and what files in the other forms call them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any

@@ -1,7 +1,5 @@
 """Values of controllers and tasks that are given for slides: with units of length and force where a shaft has units of angle and torque."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 

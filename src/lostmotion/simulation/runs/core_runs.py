@@ -1,7 +1,5 @@
 """Runs of the core: what they take of a scenario, and what they give."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ... import _core

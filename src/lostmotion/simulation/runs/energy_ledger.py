@@ -1,7 +1,5 @@
 """The energy ledger of a run, and the warning where it does not close."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Errors of controlled axes against their references."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

@@ -1,7 +1,5 @@
 """Estimate of the time of a run, by runs of its first part and of the parts after a change of its inputs."""
 
-from __future__ import annotations
-
 import itertools
 import math
 import time

@@ -1,7 +1,5 @@
 """Motors under field-oriented control: torque computed from currents, and error bounds of a run."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Iterator, Mapping

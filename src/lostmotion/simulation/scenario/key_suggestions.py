@@ -1,7 +1,5 @@
 """Keys of a scenario that may have been meant by one that it does not have."""
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any

@@ -1,7 +1,5 @@
 """Scenarios of one motor, one gearbox and one load, whose numbers the core varies by itself in studies."""
 
-from __future__ import annotations
-
 from ...control.continuous import ContinuousController
 from ...model.gear import Gear
 from ...model.shaft import Shaft

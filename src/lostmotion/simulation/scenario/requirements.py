@@ -1,7 +1,5 @@
 """Requirements of functions on scenarios, with the line that refuses another one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 
 from ...errors import InputError

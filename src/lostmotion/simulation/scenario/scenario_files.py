@@ -1,7 +1,5 @@
 """Scenario files: found, read with what they are based on, and changed by dotted key."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache

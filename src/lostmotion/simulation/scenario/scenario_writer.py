@@ -1,7 +1,5 @@
 """A scenario file with some values changed, its comments and its order kept."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress

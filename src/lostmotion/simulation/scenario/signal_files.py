@@ -1,7 +1,5 @@
 """Sampled signals from CSV files: two columns, time and value."""
 
-from __future__ import annotations
-
 import csv
 import io
 import re

@@ -1,7 +1,5 @@
 """Units of the keys of a scenario, in the short or the long form."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Mapping, Sequence
 from functools import cache
 from typing import Any

@@ -1,7 +1,5 @@
 """Answers of a simulation to a load torque, with their derivatives, and snapshots: for multibody engines."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 from typing import Any

@@ -1,7 +1,5 @@
 """Drives as the actuators of the joints of a multibody engine: what they answer to the inertia matrix and the forces of a step."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

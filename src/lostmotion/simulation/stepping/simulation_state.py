@@ -1,7 +1,5 @@
 """The state of a simulation that is advanced step by step."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

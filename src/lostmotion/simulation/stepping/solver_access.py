@@ -1,7 +1,5 @@
 """Access of analyses to the solver of a simulation that is advanced step by step."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from ... import _core

@@ -1,7 +1,5 @@
 """Parts and inputs of a simulation that is advanced step by step, with the lines that refuse them."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

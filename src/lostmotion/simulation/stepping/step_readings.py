@@ -1,7 +1,5 @@
 """Result variables of a simulation that is advanced step by step."""
 
-from __future__ import annotations
-
 import threading
 from collections.abc import Callable, Iterator
 from typing import Any, overload

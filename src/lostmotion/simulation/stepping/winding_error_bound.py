@@ -1,7 +1,5 @@
 """The error bound of field-oriented control step by step: a second simulation with coarser exchanges is taken along."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

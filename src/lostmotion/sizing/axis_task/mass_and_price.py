@@ -1,7 +1,5 @@
 """Mass, length, price and lead time of a candidate of a task: sums over the data sheets of its parts."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
