@@ -52,14 +52,10 @@ def main() -> None:
     os.environ.setdefault("PYDANTIC_DISABLE_PLUGINS", "__all__")  # a search of all that is installed
     # Matrices are so small that the threads of BLAS take more time than they save.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    warnings.showwarning = _show_warning
+    # One line for a doubtful value, without the place in the code.
+    warnings.showwarning = lambda message, *_, **__: print(f"warning: {message}")
     with harmless_output():
         _run()
-
-
-def _show_warning(message: Warning | str, *_: Any, **__: Any) -> None:
-    """One line for a doubtful value, without the place in the code."""
-    print(f"warning: {message}")
 
 
 def _run() -> NoReturn:

@@ -64,7 +64,7 @@ def experiments(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> list[
         short < RISE, 0.5 - 0.5 * np.cos(math.pi * short / RISE), 1.0
     )  # a jump would leave the drive ringing
     slow = [plan("ripple", short, 0.0, SLOW * brake, rise * 0.5 * motor, still)] if ripple is not None else []
-    locked = 1.2 * motor * _triangle(time / PERIOD)
+    locked = 1.2 * motor * 2.0 / math.pi * np.arcsin(np.sin(2 * math.pi * time / PERIOD))  # a triangle wave
     loops = [plan("locked-ramp", time, 1.0, 0.0, locked, np.zeros(len(time)))]
     if _has_hysteresis(gearbox):
         loops.append(plan(HALF, time, 1.0, 0.0, 0.5 * locked, np.zeros(len(time))))
@@ -77,11 +77,6 @@ def experiments(gearbox: Gearbox, ripple: TorqueHarmonic | None = None) -> list[
         plan("braked-slow", short, 0.0, 4.0 * brake, rise * motor * np.sin(math.pi * short), still),
         *slow,
     ]
-
-
-def _triangle(x: np.ndarray) -> np.ndarray:
-    """Triangle wave of period 1, between -1 and 1, from 0 upwards."""
-    return np.asarray(2.0 / math.pi * np.arcsin(np.sin(2 * math.pi * x)))
 
 
 def _rotor(gearbox: Gearbox) -> float:

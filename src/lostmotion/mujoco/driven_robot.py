@@ -80,7 +80,9 @@ class Actuated:
         ]
         self._actuators = tuple(given.values())
         self._drives: dict[str, JointDrive] = dict(zip(self.joints, made, strict=True))
-        self.substeps = _substeps(made, step) if substeps is None else substeps
+        # So many that the stiffest mesh turns by at most SUBSTEP_PHASE in each.
+        phases = (d.mesh_frequency * step / SUBSTEP_PHASE for d in made)
+        self.substeps = max(1, *map(math.ceil, phases)) if substeps is None else substeps
         if self.substeps > MAX_SUBSTEPS:
             worst = max(made, key=lambda d: d.mesh_frequency)
             raise InputError(
@@ -396,8 +398,3 @@ class Actuated:
     def _restore_robot(self, state: ActuatedState) -> None:
         self._mj.mj_setState(self.model, self.data, state.mujoco, self._kind)
         self._robot.course, self._contact = state.course
-
-
-def _substeps(drives: Sequence[JointDrive], step: float) -> int:
-    """So many that the stiffest mesh turns by at most SUBSTEP_PHASE in each."""
-    return max(1, *(math.ceil(d.mesh_frequency * step / SUBSTEP_PHASE) for d in drives))

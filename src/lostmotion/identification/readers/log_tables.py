@@ -113,13 +113,11 @@ def table_log(rows: Iterator[TableRow], number: Callable[[Any], float | None], c
             notes.append("its time stamps have no zone; they are taken to be of one clock that is not set meanwhile")
     else:
         values = values * seconds_of(units.get(names[place], ""))
-    found = {name: Channel(table[:, k], units.get(name, "")) for k, name in enumerate(names) if k != place}
-    return Log("", values, {n: c for n, c in found.items() if not _is_blank(n, c)}, header, tuple(notes))
-
-
-def _is_blank(name: str, channel: Channel) -> bool:
-    """Whether a column has neither name nor values, such as behind a separator at the end of each line."""
-    return name.startswith("column ") and bool(np.isnan(channel.values).all())
+    # A column with neither name nor values is behind a separator at the end of each line.
+    blank = [name.startswith("column ") and bool(np.isnan(x).all()) for name, x in zip(names, table.T, strict=True)]
+    kept = [k for k in range(len(names)) if k != place and not blank[k]]
+    found = {names[k]: Channel(table[:, k], units.get(names[k], "")) for k in kept}
+    return Log("", values, found, header, tuple(notes))
 
 
 Columns = list[tuple[str, str | None]]

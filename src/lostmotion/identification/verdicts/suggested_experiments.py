@@ -24,8 +24,9 @@ def remedy_for(rig: Rig, names: Sequence[str]) -> str:
         return f"give {both}" if torque else f"give a stall torque, or {both}"
     if enter("stiffness", "backlash", "hysteresis"):
         return "give a slow torque ramp with the output locked"
+    references = any(name.endswith("_reference") for name in rig.task.inputs)
     if enter("delay", "sample_time"):
-        return f"give a log with steps of the {'reference' if _has_reference(rig) else 'command'}"
+        return f"give a log with steps of the {'reference' if references else 'command'}"
     if enter("breakaway_torque", "breakaway_force", "stribeck_speed", "friction_curve"):
         return "give slow reversals, and a log that creeps from rest"
     inertias = [any(part in key for key in own for part in ("inertia", "mass")) for own in keys]
@@ -49,10 +50,6 @@ def torque_known(rig: Rig) -> bool:
         or variables & {train.variable(name, "torque"), train.variable(name, "current")}
         for name, motor in train.motors.items()
     )
-
-
-def _has_reference(rig: Rig) -> bool:
-    return any(name.endswith("_reference") for name in rig.task.inputs)
 
 
 def keys_of(task: Identification, name: str) -> list[str]:

@@ -193,8 +193,5 @@ def pareto_front(ranked: list[RankedCandidate], select: Selection) -> list[Ranke
     """Runs that fit, such that no other fitting run is better in one objective without being worse in another."""
     fitting = [c for c in ranked if c.fits]
     ranks = np.array([_rank(c, select) for c in fitting]).reshape(len(fitting), len(select.objectives))
-    return [c for c, rank in zip(fitting, ranks, strict=True) if not _dominated(rank, ranks)]
-
-
-def _dominated(rank: np.ndarray, others: np.ndarray) -> bool:
-    return bool(((others <= rank).all(axis=1) & (others < rank).any(axis=1)).any())
+    better = [(ranks <= rank).all(axis=1) & (ranks < rank).any(axis=1) for rank in ranks]
+    return [c for c, others in zip(fitting, better, strict=True) if not others.any()]

@@ -258,6 +258,11 @@ class Study(Part):
                 )
 
     @property
+    def _task(self) -> AxisTask:
+        assert self.axis is not None
+        return self.axis
+
+    @property
     def tables(self) -> dict[str, Any]:
         """The base as tables of a scenario file."""
         return self.written or self.scenario.model_dump()
@@ -291,10 +296,9 @@ class Study(Part):
         if one is not self:
             return one.axis_at(row, cycles)
         motor, gearbox = self.part("motor", row), self.part("gearbox", row)
-        assert self.axis is not None
-        if self.axis.linear is not None and not self.slides_itself(row):
+        if self._task.linear is not None and not self.slides_itself(row):
             gearbox = self._with_stage(gearbox, row)
-        return axis_scenario(self.base_of(row), motor, gearbox, self.axis, cycles)
+        return axis_scenario(self.base_of(row), motor, gearbox, self._task, cycles)
 
     def base_of(self, row: np.ndarray) -> Scenario:
         """The base of a row of a task: of a linear motor with the scale alone, and the weight of its coils on the guide."""
@@ -302,16 +306,14 @@ class Study(Part):
             return self.scenario
         key = ("base", self.part_key("motor", row))
         if key not in self.kept:
-            assert self.axis is not None
-            assert self.axis.linear is not None
+            assert self._task.linear is not None
             base, coils = with_scale_alone(self.scenario), float(self.part("motor", row).rotor_inertia)
-            self.kept[key] = base.model_copy(update={"load": self.axis.linear.carrying(base.load, coils)})
+            self.kept[key] = base.model_copy(update={"load": self._task.linear.carrying(base.load, coils)})
         return self.kept[key]  # type: ignore[no-any-return]
 
     def _with_stage(self, gearbox: Any, row: np.ndarray) -> Any:
         """A gearbox and the stage of a row behind it as one, made once."""
-        assert self.axis is not None
-        keys = self.part_key("gearbox", row), self.part_key(str(self.axis.stage_kind), row)
+        keys = self.part_key("gearbox", row), self.part_key(str(self._task.stage_kind), row)
         if keys not in self.kept:
             self.kept[keys] = together(gearbox, self.part("stage", row))
         return self.kept[keys]
@@ -361,10 +363,8 @@ class Study(Part):
 
     def _stepper(self, parameters: tuple[tuple[int, float], ...]) -> Motor | None:
         """The stepper of a row of a task; None of another motor."""
-        assert self.axis is not None
-        if not self.axis.steppers:
-            return None
-        return stepper_of(self.axis.steppers, [(self.vary[k], number) for k, number in parameters])
+        steppers = self._task.steppers
+        return stepper_of(steppers, [(self.vary[k], number) for k, number in parameters]) if steppers else None
 
     def brake(self, row: np.ndarray) -> HoldingBrake | None:
         """The holding brake of a row of a task.
@@ -374,8 +374,7 @@ class Study(Part):
         InputError
             The task wants the brake of the motor, and the catalogue has none.
         """
-        assert self.axis is not None
-        brake = self.axis.brake
+        brake = self._task.brake
         if brake is None or not brake.of_the_motor:
             return brake
         record = next((r for kind, r in self.records(row).items() if kind in ("motor", *WHOLE)), None)
@@ -385,21 +384,14 @@ class Study(Part):
 
     def _keep_whole(self, kind: str, k: int, row: np.ndarray) -> None:
         """Keeps motor and gearbox of a whole drive."""
-        task = self.axis
-        assert task is not None
+        task = self._task
         beside, friction = task.whole.get(kind, {}), 0.0 if task.linear is None else task.linear.guide_friction
         motor, gearbox = whole_drive(kind, str(self.vary[k].value(row[k])), beside, friction or 0.0)
         self.kept[self.part_key("gearbox", row)] = gearbox
         self.kept[self.part_key("motor", row)] = task.fed(motor, None if kind == "linear_motor" else self.brake(row))
 
     def _under(self, task: AxisTask, motor: Motor, brake: HoldingBrake | None) -> Motor:
-        """A motor as the supply of a task feeds it.
-
-        Raises
-        ------
-        InputError
-            The current loop of the task is not for this motor.
-        """
+        """A motor as the supply of a task feeds it."""
         if task.current is not None and motor.kind != "torque_source":
             values = {"motor": motor.model_dump(), "controller.current": task.current.model_dump()}
             self.scenario.replace(**values)
@@ -413,13 +405,9 @@ class Study(Part):
         InputError
             A file of them cannot be read.
         """
-        assert self.axis is not None
-        linear = self.axis.linear
-        found: dict[str, Sheet] = {}
-        tables = {
-            "motor": self.axis.steppers or self.tables.get("motor", {}),
-            "gearbox": self.tables.get("gearbox", {}),
-        }
+        linear, found = self._task.linear, dict[str, Sheet]()
+        motor = self._task.steppers or self.tables.get("motor", {})
+        tables = {"motor": motor, "gearbox": self.tables.get("gearbox", {})}
         if (whole := self.whole_drive(row)) is not None:
             kind, k = whole
             found[kind], tables = find(str(self.vary[k].value(row[k])), kind), {}
