@@ -36,7 +36,12 @@ class Scenario:
         self.lib, error = lib, c.create_string_buffer(500)
         handle = lib.lm_scenario_read(doubles(numbers), c.c_size_t(len(numbers)), error, c.c_size_t(500))
         self.refused = error.value.decode()
-        self.handle = c.c_void_p(handle)
+        self._handle = c.c_void_p(handle)
+
+    @property
+    def handle(self) -> c.c_void_p:
+        assert self._handle, f"{self.refused}; after a change of the core `make c-library` builds the library"
+        return self._handle
 
     def error(self) -> str:
         return self.lib.lm_scenario_error(self.handle).decode()
@@ -380,7 +385,7 @@ def test_numbers_that_are_no_description_are_refused(
     said: str,
 ) -> None:
     scenario = Scenario(library, change(lm.portable.description(lm.load("paper-2dof-nl-small"), parameters=False)))
-    assert not scenario.handle
+    assert not scenario._handle
     assert said in scenario.refused
 
 
