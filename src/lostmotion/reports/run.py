@@ -248,10 +248,18 @@ def _motion_lines(result: xarray.Dataset) -> list[str]:
 
 def _stuck(result: xarray.Dataset | RunArrays) -> list[tuple[float, str]]:
     """Share of the time for which each sticking contact is stuck, and the same in words."""
-    flanks = Scenario.from_json(result.attrs["scenario"]).train().flanks()
+    train = Scenario.from_json(result.attrs["scenario"]).train()
+    turned = {*(gear.input for gear in train.gears.values()), *(motor.shaft for motor in train.motors.values())}
+    # A load without dry friction is at rest where all before it is stuck, and holds nothing by itself.
+    free = {
+        train.variable(name, "contact")
+        for name, shaft in train.shafts.items()
+        if name not in turned and not any(map(np.any, shaft.friction().values()))
+    }
+    passed = free.union(train.flanks())
     share, found = weights(np.asarray(result["time"])), []
     names = (v.name for v in recorded_variables(result.attrs))
-    for name in (n for n in names if n.endswith("_contact") and n in result and n not in flanks):
+    for name in (n for n in names if n.endswith("_contact") and n in result and n not in passed):
         stuck = float(np.average(np.asarray(result[name]) == 0, weights=share))
         found.append((stuck, f"{name.removesuffix('_contact').replace('_', ' ')} {part_of_whole(stuck)}"))
     return found
