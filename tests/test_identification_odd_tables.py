@@ -27,13 +27,18 @@ def read(path: Path, lines: list[str] | str) -> lm.identification.Log:
 
 
 @pytest.mark.parametrize(("separator", "decimal"), [(",", "."), (";", ","), ("\t", ","), (" ", ".")])
-@pytest.mark.parametrize("damage", ["cut", "cut within a number", "ERROR", "short line", "first cell"])
+@pytest.mark.parametrize("damage", ["cut", "cut within a number", "cut to another number", "ERROR", "short line", "first cell"])
 def test_a_damaged_line_or_cell_costs_only_itself(tmp_path: Path, damage: str, separator: str, decimal: str) -> None:
     lines = rows(separator, decimal)
-    gone = {"cut": 59, "cut within a number": 59, "ERROR": 30, "short line": 30, "first cell": 0}[damage]
+    gone = {"cut": 59, "cut within a number": 59, "cut to another number": 59, "ERROR": 30, "short line": 30, "first cell": 0}[damage]
     cells = lines[gone].split(separator)
     lines[gone] = separator.join(
-        {"cut": cells[:2], "cut within a number": [*cells[:1], "-"], "short line": cells[:1]}.get(damage, [cells[0], "ERROR", cells[2]])
+        {
+            "cut": cells[:2],
+            "cut within a number": [*cells[:1], "-"],
+            "cut to another number": [*cells[:2], cells[2][:-3]],
+            "short line": cells[:1],
+        }.get(damage, [cells[0], "ERROR", cells[2]])
     )
     log = read(tmp_path / "a.csv", [separator.join(["time", "x", "y"]), *lines])
     number = gone + 2

@@ -18,6 +18,8 @@ from .log_tables import TableRow, UnreadError, plain_number, split_at_spaces, ta
 
 PER_CELL = 11  # bytes of memory for a value while the table grows, measured
 WITH_COMMA = re.compile(r"\s*[+-]?\d+(,\d+)?([eE][+-]?\d+)?\s*")
+LAST_CELL = re.compile(r".*[;\t ,](?=[^;\t ])")  # all before the last cell of a line
+COMPARED = 10  # lines before the last one
 THOUSANDS = re.compile(r"\s*[+-]?[1-9]\d{0,2}(,\d{3})+\s*")
 
 
@@ -64,6 +66,7 @@ def read_text_log(path: Path, time: str, decimal: str) -> Log:
         text = path.read_text(encoding="utf-8-sig")
     except UnicodeDecodeError as error:
         raise InputError(f"is not UTF-8 text (byte {error.start}); save it as CSV in UTF-8") from None
+    text, cut = _without_cut_number(text)
     cells = max(map(text.count, ",;\t ")) + text.count("\n") + 1
     check_memory(2 * sys.getsizeof(text) + PER_CELL * cells)
     problems: list[UnreadError] = []
@@ -77,7 +80,8 @@ def read_text_log(path: Path, time: str, decimal: str) -> Log:
         except UnreadError as problem:
             problems.append(problem)
             continue
-        return log if decimal else _announced(log, reading)
+        log = log if decimal else _announced(log, reading)
+        return replace(log, notes=(*log.notes, *cut))
     found: list[tuple[int, Log, Reading]] = []
     for reading in ways:
         comments = []
@@ -90,9 +94,25 @@ def read_text_log(path: Path, time: str, decimal: str) -> Log:
             found.append((lost, log, reading))
     if found:
         _, log, reading = min(found, key=lambda way: way[0])
-        return log if decimal else _announced(log, reading)
+        log = log if decimal else _announced(log, reading)
+        return replace(log, notes=(*log.notes, *cut))
     worst = max(problems, key=lambda problem: problem.row)
     raise InputError(f"{f'line {worst.row}: ' if worst.row else ''}{worst}")
+
+
+def _without_cut_number(text: str) -> tuple[str, tuple[str, ...]]:
+    """The text without a last line that has no end and a shorter last number than all lines before, and a note on it.
+
+    A file that was cut off within a number has another number there, which nothing else shows.
+    """
+    body, _, last = text.rpartition("\n")
+    ends = [len(LAST_CELL.sub("", line)) for line in body.splitlines()[-COMPARED:]]
+    if len(ends) < COMPARED or not last or len(LAST_CELL.sub("", last)) >= min(ends):
+        return text, ()
+    line = text.count("\n") + 1
+    return body + "\n", (
+        f"line {line} has no end and is left out: {last[-40:]!r} may be cut off within its last number",
+    )
 
 
 def _announced(log: Log, reading: Reading) -> Log:
