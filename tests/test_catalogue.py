@@ -624,3 +624,14 @@ def test_wear_adds_backlash_and_multiplies_losses():
     new, worn = (lm.gearbox("bonfiglioli-tr080-3-90"), lm.gearbox("bonfiglioli-tr080-3-90", added_backlash=2e-3, loss_factor=1.5))
     assert worn.stiffness.backlash - new.stiffness.backlash == pytest.approx(2e-3)
     assert worn.losses.core()(1.0, 1.0) == pytest.approx(1.5 * new.losses.core()(1.0, 1.0))
+
+
+def test_a_title_of_a_base_names_the_values_that_a_file_over_it_changes(tmp_path: Path) -> None:
+    """The joint of the base swings at 1 Hz, that of the file at 2 Hz; a title of its own says what it says."""
+    plain = lm.load("catalogue-robot-joint").title
+    file = tmp_path / "mine.toml"
+    file.write_text('base = "catalogue-robot-joint"\n[command]\nfrequency = "2 Hz"\n[simulation]\nduration = 1.0\n')
+    assert lm.load(file).title == f"{plain}; changed: command.frequency"
+    assert lm.load(file, {"load.inertia": 2.0}).title == f"{plain}; changed: command.frequency, load.inertia"
+    file.write_text('title = "Mine"\n' + file.read_text())
+    assert lm.load(file).title == "Mine"

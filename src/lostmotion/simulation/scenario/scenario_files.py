@@ -156,7 +156,20 @@ def _read(path: Path, including: tuple[Path, ...]) -> dict[str, Any]:
     with prefixed(path):
         _change_voltages(based, data)
     _change_what_turns(based, data)
-    return _merge(based, data)
+    merged = _merge(based, data)
+    if "title" not in data and isinstance(merged.get("title"), str):
+        merged["title"] = title_with(merged["title"], _changed_keys(data))
+    return merged
+
+
+def _changed_keys(data: Mapping[str, Any]) -> list[str]:
+    """Keys of the tables of a file over a base, by which its motion differs."""
+    tables = {name: table for name, table in data.items() if name != "simulation"}
+    return [
+        key
+        for name, table in tables.items()
+        for key in ([f"{name}.{part}" for part in table] if isinstance(table, Mapping) else [name])
+    ]
 
 
 def _change_what_turns(based: dict[str, Any], data: Mapping[str, Any]) -> None:
