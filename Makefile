@@ -8,8 +8,8 @@ SOURCES := $(CORE_SOURCES) $(wildcard bindings/*.[ch]pp) CMakeLists.txt
 # One build tree for the extension, the C library, the library of FMUs and the tests of the core.
 TREE := build/native
 PACKAGE := src/lostmotion
-# Two makes at once, or one with several jobs, wait for each other there.
-ONE_BY_ONE := $(if $(shell command -v flock),flock build/native.lock)
+# Two makes at once, or one with several jobs, wait for each other there, and say so.
+ONE_BY_ONE := $(if $(shell command -v flock),.ci/one_by_one)
 CMAKE := $(ONE_BY_ONE) $(BIN)/cmake
 BUILD := $(CMAKE) --build $(TREE)
 NODE := command -v npm >/dev/null

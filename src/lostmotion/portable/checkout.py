@@ -3,6 +3,7 @@
 import shutil
 import subprocess
 import sys
+import threading
 import time
 from collections.abc import Iterable
 from pathlib import Path
@@ -33,19 +34,25 @@ def made_here(target: str, made: Iterable[Path], what: str) -> None:
     if shutil.which("make") is None:
         return
     print(f"Compiling {what}; this takes a minute or two, once.", file=sys.stderr)
-    begin = time.monotonic()
+    begin, lines = time.monotonic(), ["it starts"]
     with subprocess.Popen(
-        ["make", "-C", str(CHECKOUT), target], stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+        ["make", "-C", str(CHECKOUT), target], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True
     ) as work:
+        assert work.stdout is not None
+        reader = threading.Thread(target=lines.extend, args=(map(str.strip, work.stdout),), daemon=True)
+        reader.start()
         while True:
             try:
-                _, errors = work.communicate(timeout=EVERY)
+                work.wait(EVERY)
                 break
             except subprocess.TimeoutExpired:
-                waited = time.monotonic() - begin
-                print(
-                    f"  {waited:.0f} s: make {target} compiles, or waits for another make in {CHECKOUT}",
-                    file=sys.stderr,
-                )
+                print(f"  {time.monotonic() - begin:.0f} s: make {target}: {_last(lines)}", file=sys.stderr)
+        reader.join()
     if work.returncode != 0:
-        raise InputError(f"make {target}: failed in {CHECKOUT}; its last line: {errors.strip().rpartition(chr(10))[2]}")
+        raise InputError(f"make {target}: failed in {CHECKOUT}; its last line: {_last(lines)}")
+
+
+def _last(lines: list[str]) -> str:
+    """The last line that a program under make printed, or make itself if none did."""
+    found = [line for line in lines if line] or [""]
+    return next((line for line in reversed(found) if not line.startswith("make")), found[-1])
