@@ -42,6 +42,17 @@ export class Actions {
       this.use(system.matches ? "dark" : "light");
       this.page.redraw();
     });
+    let before: Theme = "light";
+    addEventListener("beforeprint", () => {
+      before = document.documentElement.dataset.theme as Theme;
+      this.use("light");
+      this.page.redraw();
+      this.page.pictures();
+    });
+    addEventListener("afterprint", () => {
+      this.use(before);
+      this.page.redraw();
+    });
     this.theme.addEventListener("click", () => {
       this.use(document.documentElement.dataset.theme === "dark" ? "light" : "dark");
       this.page.redraw();

@@ -33,7 +33,7 @@ function row(l: LoopView): HTMLElement {
   const degrees = l.phase_margin === null ? null : (l.phase_margin * 180) / Math.PI;
   const cells = l.stable
     ? [
-        number(l.gain_margin, ""),
+        number(l.gain_margin === null ? null : 20 * Math.log10(l.gain_margin), " dB"),
         number(degrees, "°"),
         number(l.crossover, " Hz"),
         number(l.bandwidth, " Hz"),

@@ -124,7 +124,7 @@ export class TimeCharts {
       figure.series.forEach(({ variable, minus, factor }, n) => {
         const less = minus ? this.run!.values.get(minus)![k]! : 0;
         const value = (this.run!.values.get(variable)![k]! - less) * factor;
-        readings[n]!.textContent = `${format(value / s.factor, 3)} ${s.unit}`;
+        readings[n]!.textContent = `${format(value / s.factor, 3)}${s.unit === "°" ? "" : " "}${s.unit}`;
       });
     }
   }

@@ -17,14 +17,14 @@ export interface Shown {
   factor: number;
 }
 
-/** Angles below this are in arcmin, as backlash and twist are everywhere. */
+/** Angles below this are in arcmin, as backlash and twist are everywhere, larger ones in degrees, as moves are. */
 const SMALL_ANGLE = 0.1;
 
 /** The unit in which values up to `largest` read well. */
 export function shown(unit: string, largest: number): Shown {
   const written = WRITTEN[unit] ?? unit;
   if (unit === "rad" && largest > 0) {
-    return largest < SMALL_ANGLE ? { unit: "arcmin", factor: Math.PI / 10800 } : { unit, factor: 1 };
+    return largest < SMALL_ANGLE ? { unit: "arcmin", factor: Math.PI / 10800 } : { unit: "°", factor: Math.PI / 180 };
   }
   if (written === "" || largest === 0 || !Number.isFinite(largest)) return { unit: written, factor: 1 };
   const allowed = /^(rad|m\b)/.test(written) ? PREFIXES.slice(1) : PREFIXES;
@@ -37,7 +37,7 @@ export function format(value: number, digits = 4): string {
   if (!Number.isFinite(value)) return "–";
   const text = Number(value.toPrecision(digits));
   const size = Math.abs(text);
-  const written = size !== 0 && (size < 1e-4 || size >= 1e6) ? text.toExponential() : String(text);
+  const written = size !== 0 && (size < 1e-4 || size >= 1e6) ? text.toExponential().replace("+", "") : String(text);
   return written.replace("-", "−");
 }
 

@@ -13,13 +13,15 @@ from ..pointing.budget import Errors, PointingBudget, PointingError
 from ..units.practical import ROUNDING as ROUNDED
 from ..units.practical import excess, told_apart
 from ..verdict import Point, Verdict
-from .looks import look
+from .looks import FAINT, look
 from .page import Prose, Report, Table
 from .pages import table_csv
 from .panels import Bars, Curve, Group, Panel
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
 ARCSEC = 648_000.0 / math.pi
+FARTHEST = 20.0  # times the peak of an error: a limit beyond it is not drawn, as it would flatten the error
+MEASURED: dict[str, Any] = look(1) | {"linestyle": "-", "linewidth": 0.7}  # steps of an encoder fill a band
 ROUNDING = 1e-12  # [rad, m], below which an error is rounding
 
 
@@ -105,14 +107,25 @@ def error_panels(budget: PointingBudget) -> list[Panel]:
     kept = budget.time >= budget.after
     time = budget.time[kept]
     factor, _ = _unit(budget)
+
+    def limits(axis: str) -> list[Curve]:
+        most = budget.limits.get(axis, math.inf)
+        if most > FARTHEST * budget.whole[axis].peak:
+            return []
+        return [
+            Curve(name, time[[0, -1]], np.full(2, sign * factor * most), FAINT, legend)
+            for name, sign, legend in (("limit", 1.0, "limit"), ("limit, below", -1.0, "_"))
+        ]
+
     return [
         Panel(
-            axis,
+            f"Error of {axis}",
             "time [s]",
             f"error [{_unit(budget, axis)[1]}]",
             (
-                Curve("measured direction", time, factor * budget.measured[axis][kept], look(1)),
+                Curve("measured direction", time, factor * budget.measured[axis][kept], MEASURED),
                 Curve("true direction: reference less load", time, factor * error[kept], look(0), "true direction"),
+                *limits(axis),
             ),
         )
         for axis, error in budget.errors.items()
@@ -133,7 +146,7 @@ def speed_panels(budget: PointingBudget) -> list[Panel]:
 
     return [
         Panel(
-            axis,
+            f"Error of {axis}",
             "speed of the target, times that of the scenario",
             f"error [{_unit(budget, axis)[1]}]",
             (curve(axis, "rms", _dotted(0)), curve(axis, "peak", _dotted(1))),
@@ -176,7 +189,11 @@ def _number(name: str) -> float:
 def _bars(budget: PointingBudget) -> Group:
     """Contributions of the causes to the mean square error of each axis."""
     charts = tuple(
-        Bars(axis, _falls(budget, axis), {n: (1e12 * part,) for n, part in budget.contributions(axis).items()})
+        Bars(
+            f"Error of {axis}",
+            _falls(budget, axis),
+            {n: (1e12 * part,) for n, part in budget.contributions(axis).items()},
+        )
         for axis in budget.whole
     )
     return Group("contributions", "Contributions of the causes", CONTRIBUTED, charts, max(1, len(charts)))

@@ -65,6 +65,12 @@ def unit_of_source(response: xarray.Dataset) -> str:
     return "-" if unit == "1" else printed(unit)
 
 
+def unit_of_gain(response: xarray.Dataset, output: str) -> str:
+    """Unit of the output by the unit of the input, for labels."""
+    unit, of_source = printed(str(response["unit"].sel(output=output).item())), unit_of_source(response)
+    return unit if of_source == "-" else f"{unit} / {of_source}"
+
+
 def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
     """Gain and phase over frequency: a colour for each amplitude, a line style for each model."""
     first = next(iter(responses.values()))
@@ -82,12 +88,10 @@ def bode(responses: Mapping[str, xarray.Dataset], output: str) -> list[Panel]:
             gain.append(Curve(label, f, np.abs(values), style, legend))
             phase.append(Curve(label, f, np.degrees(np.unwrap(np.angle(values))), style, legend))
     source, of_source = first.attrs["source"], unit_of_source(first)
-    unit = printed(str(first["unit"].sel(output=output).item()))
-    of_gain = unit if of_source == "-" else f"{unit} / {of_source}"
     by = f"by amplitude of the {source.replace('_', ' ')}" + ("" if of_source == "-" else f" [{of_source}]")
     title = f"{output.replace('_', ' ').capitalize()}, {by}"
     return [
-        Panel(title, "frequency [Hz]", f"gain [{of_gain}]", tuple(gain), log_x=True, log_y=True),
+        Panel(title, "frequency [Hz]", f"gain [{unit_of_gain(first, output)}]", tuple(gain), log_x=True, log_y=True),
         Panel("Phase", "frequency [Hz]", "phase [degrees]", tuple(phase), log_x=True),
     ]
 
@@ -110,7 +114,11 @@ def maps(response: xarray.Dataset, output: str) -> list[Panel]:
         return Panel(title, "frequency [Hz]", label, (), log_x=True, log_y=True, ground=ground)
 
     return [
-        panel(f"Gain of {output.replace('_', ' ')}", "gain [dB]", np.where(shown, gain, np.nan)),
+        panel(
+            f"Gain of {output.replace('_', ' ')}",
+            f"gain [dB of 1 {unit_of_gain(response, output)}]",
+            np.where(shown, gain, np.nan),
+        ),
         panel("Phase", "phase [degrees]", np.where(shown, phase, np.nan)),
         panel("Mean efficiency", "efficiency [-]", response["efficiency"].values),
         panel("Total harmonic distortion", "THD [%]", harmonics),
@@ -126,9 +134,9 @@ def amplitude_lines(found: xarray.Dataset) -> list[str]:
     for a in found["amplitude"].values:
         band, cross = (float(found[k].sel(amplitude=a)) for k in ("bandwidth", "phase_crossover"))
         text = [
-            f"gain -3 dB at {band:.4g} Hz"
+            f"gain 3 dB below its first value at {band:.4g} Hz"
             if math.isfinite(band)
-            else "gain -3 dB outside the frequencies, or no motion"
+            else "gain 3 dB below its first value outside the frequencies, or no motion"
         ]
         text += [f"phase -180 degrees at {cross:.4g} Hz"] if math.isfinite(cross) else []
         lines.append(f"amplitude {a:g}: {', '.join(text)}")

@@ -19,7 +19,7 @@ from .pages import table_csv
 from .panels import Curve, Group, Mark, Panel
 
 DEGREES = 180.0 / math.pi
-LEAD = 2.0  # [deg] of a phase that is drawn as 0
+LEAD = 2.0  # [deg] of a phase from which on it begins a turn below
 HEADER = (
     "loop",
     "regime",
@@ -139,7 +139,9 @@ def _open_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
             # At the crossover the loop is -exp(j margin) or its conjugate; its side follows from its neighbours.
             side = np.interp(m.crossover, row.frequency, np.imag(-row.open_loop))
             margin = math.copysign(DEGREES * m.phase_margin, side)
-            at_phase.append(Mark(m.crossover, margin - 180.0, "", look(k), to=-180.0))
+            drawn = np.interp(m.crossover, row.frequency, _phase(row.open_loop))
+            turns = 360.0 * round((drawn - (margin - 180.0)) / 360.0)  # of the curve, which does not wrap
+            at_phase.append(Mark(m.crossover, margin - 180.0 + turns, "", look(k), to=turns - 180.0))
         if m.gain_margin > 0.0 and math.isfinite(m.gain_margin):
             at_gain.append(Mark(m.gain_margin_frequency, -decibels(m.gain_margin), "", look(k), to=0.0))
     gain = _panel(
@@ -178,9 +180,7 @@ def _closed_panels(report: ServoReport, loop: str) -> tuple[Panel, Panel]:
 def _phase_panel(
     report: ServoReport, loop: str, which: str, response: Callable[[LoopSheet], np.ndarray], **options: Any
 ) -> Panel:
-    return _panel(
-        report, loop, f"{which}: phase", "phase [deg]", lambda r: _phase(response(r)), y_range=(-360.0, 0.0), **options
-    )
+    return _panel(report, loop, f"{which}: phase", "phase [deg]", lambda r: _phase(response(r)), **options)
 
 
 def _gain(response: np.ndarray) -> np.ndarray:
@@ -190,11 +190,12 @@ def _gain(response: np.ndarray) -> np.ndarray:
 
 
 def _phase(response: np.ndarray) -> np.ndarray:
-    """Phase in degrees between -360 and 0; the curve is broken where it wraps."""
-    phase = np.where(np.abs(response) > 1e-9, np.mod(DEGREES * np.angle(response), -360.0), np.nan)
-    phase = np.where(phase < -360.0 + LEAD, 0.0, phase)  # a lead too small to be seen
-    wraps = np.flatnonzero(np.abs(np.diff(phase)) > 180.0)
-    phase[wraps] = np.nan
+    """Phase in degrees without jumps, from between -360 and 0 on; a gain that is rounding alone has none."""
+    there = np.abs(response) > 1e-9
+    phase = np.full(len(response), np.nan)
+    found = DEGREES * np.unwrap(np.angle(response[there]))
+    if len(found):
+        phase[there] = found - 360.0 * math.ceil((found[0] - LEAD) / 360.0)
     return phase
 
 

@@ -21,6 +21,7 @@ NARROW = 380.0  # width of bars and histograms, about the width of a card in thr
 LEFT, RIGHT, TOP, BOTTOM = 62.0, 12.0, 10.0, 36.0
 POINTS = 1200  # of a curve, before those are dropped that no one sees
 CONSTANT = 1e-9  # relative differences up to which are rounding
+LETTER = 5.7  # width of one in the name of a bar
 NAMES = 8  # along an axis
 DOTS = 600  # of a cloud
 SHADES = 16  # of a map
@@ -246,7 +247,8 @@ def _bars(bars: Bars) -> str:
     """The longest bar first."""
     order = sorted(bars.values, key=lambda name: -max(map(abs, bars.values[name])))
     limits = bars.x_range or extent([*bars.values.values(), [0.0]], False, 0.0)
-    left = min(0.5 * NARROW, 14.0 + 6.2 * max(map(len, order), default=0))
+    left = min(0.62 * NARROW, 14.0 + LETTER * max(map(len, order), default=0))
+    fits = int((left - 14.0) / LETTER)
     to_x = _scale(limits, left, NARROW - RIGHT, False)
     row = 24.0
     height = TOP + row * len(order) + BOTTOM
@@ -257,7 +259,7 @@ def _bars(bars: Bars) -> str:
         parts.append(f'<text class="tick" x="{at:.1f}" y="{height - BOTTOM + 14}">{_shown(v)}</text>')
     for k, name in enumerate(order):
         top = TOP + row * k
-        parts.append(f'<text class="tick end" x="{left - 6:.1f}" y="{top + 15:.1f}">{escape(name)}</text>')
+        parts.append(f'<text class="tick end" x="{left - 6:.1f}" y="{top + 15:.1f}">{escape(_cut(name, fits))}</text>')
         thick = 16.0 / len(bars.values[name])
         for n, value in enumerate(bars.values[name]):
             cut = bars.limit is not None and value > limits[1]  # its length would flatten all others
@@ -273,6 +275,11 @@ def _bars(bars: Bars) -> str:
         parts.append(f'<path d="M{end} {TOP}V{height - BOTTOM}" stroke="var(--text)" stroke-dasharray="4 3"/>')
     parts.append(f'<text class="tick end" x="{NARROW - RIGHT}" y="{height - 4:g}">{escape(bars.label)}</text>')
     return _svg(bars.title, height, parts, NARROW)
+
+
+def _cut(name: str, letters: int) -> str:
+    """A name of so many letters at most; the bar beside it has all of it."""
+    return name if len(name) <= letters else f"{name[: letters - 1]}…"
 
 
 def _histogram(chart: Histogram) -> str:

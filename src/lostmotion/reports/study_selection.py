@@ -31,7 +31,7 @@ PARETO = "Each point is a candidate; point at it to read its name and values. Th
 NEAREST = 5  # candidates that do not fit, for which a slower cycle is sought
 MAX_LINES = 6  # lines of each list that are printed; the page has all
 RECORDS_LACK = "Not judged, since a record lacks what a run needs:"
-RULES_LACK = "Rules that are not judged, for want of a datum:"
+RULES_LACK = "Rules that are not judged:"
 ALL = "on the page and in its selection.csv"
 MAX_ROWS = 25  # of a table on the page
 LARGE = {
@@ -106,7 +106,7 @@ def show_selection(table: pa.Table, study: Study) -> Shown:
             *_miss_tables(near),
             *_misfit_tables(misfits),
             *_unknown_tables(unknown, "Not judged: data that are missing"),
-            *_unknown_tables(rules, "Rules that are not judged: data that are missing"),
+            *_unknown_tables(rules, "Rules that are not judged"),
         ),
         tables={"selection.csv": _selection_csv(table, study, ranked, front), "limits.csv": table_csv(header, rows)},
     )
@@ -386,4 +386,4 @@ def _unknown_tables(groups: list[Lacking], title: str) -> list[Table]:
     if not groups:
         return []
     rows = [[str(len(g.candidates)), g.candidates[0], g.datum] for g in groups[:MAX_ROWS]]
-    return [Table(title, ("candidates", "such as", "what is missing"), rows)]
+    return [Table(title, ("candidates", "such as", "why"), rows)]

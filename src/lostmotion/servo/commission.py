@@ -259,7 +259,7 @@ class ServoReport:
 
     @staticmethod
     def _held(last: Settling) -> str:
-        proved = "for ever" if last.state == "settled" else "without a proof that it stays so"
+        proved = "it stays" if last.state == "settled" else "without a proof that it stays"
         return f"after the last move {proved} ({last.reason})"
 
     @staticmethod

@@ -26,7 +26,7 @@ PRINTED = (("*", "·"), ("^2", "²"), ("^3", "³"))
 
 
 # Units of charts and summaries, where they are not SI, and units of small values such as twists and errors.
-CHARTED = {"m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "m/s^2": ("mm/s²", 1e3)}
+CHARTED = {"rad": ("deg", math.degrees(1.0)), "m": ("mm", 1e3), "m/s": ("mm/s", 1e3), "m/s^2": ("mm/s²", 1e3)}
 SMALL = 1e-4  # [m], below which lengths are in µm
 CHARTED_SMALL = {"rad": ("arcmin", ARCMIN), "m": ("µm", 1e6)}
 

@@ -1,6 +1,7 @@
 """Nearest misses: candidates that almost fit, what each lacks, and how much slower the cycle would have to be."""
 
 import math
+import re
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,6 +20,7 @@ from .ranking import WINDOW, RankedCandidate
 
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried
 STEPS = 12  # halvings: what the factor is beyond 1 is found to 0.4 % of itself
+NUMBER = re.compile(r"\d[\d.]*(e[+-]?\d+)?")  # in a text
 FITS = "fits if"  # begins what is said of a cycle that fits
 AT_ANY_TIME = (*CHOICE, "inertia_ratio", "lost_motion", "output_bearing", "holding_brake", "amplifier_voltage")
 """limits of what does not depend on the time of the cycle"""
@@ -210,7 +212,7 @@ def _said(study: Study, slower: Study, row: np.ndarray, factor: float) -> str:
 
 @dataclass(frozen=True)
 class Lacking:
-    """Candidates that cannot be judged, by what their records lack."""
+    """Candidates that cannot be judged, by the reason; its numbers are those of the first candidate."""
 
     datum: str
     candidates: tuple[str, ...]
@@ -227,8 +229,10 @@ def rules_not_judged(ranked: list[RankedCandidate]) -> list[Lacking]:
 
 
 def _by_datum(found: Iterable[RankedCandidate]) -> list[Lacking]:
-    groups: dict[str, list[str]] = {}
+    groups: dict[
+        str, tuple[str, list[str]]
+    ] = {}  # by the text without its numbers, which differ from candidate to candidate
     for c in found:
         for text in c.missing:
-            groups.setdefault(text, []).append(c.name)
-    return [Lacking(text, tuple(names)) for text, names in sorted(groups.items(), key=lambda pair: -len(pair[1]))]
+            groups.setdefault(NUMBER.sub("", text), (text, []))[1].append(c.name)
+    return [Lacking(text, tuple(names)) for text, names in sorted(groups.values(), key=lambda pair: -len(pair[1]))]
