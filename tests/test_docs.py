@@ -263,3 +263,13 @@ def test_the_table_of_equations_names_functions_and_tests_that_exist(equation: s
         assert re.findall(r'"(.*)"', test)[0] in titles
     else:
         assert names and all(f"def {name}(" in (ROOT / "tests" / file).read_text() for name in names)
+
+
+def test_the_loss_map_of_the_page_has_the_efficiencies_that_it_names(tmp_path: Path) -> None:
+    page = (ROOT / "docs" / "catalogue-data.md").read_text().partition("## A loss map of your own")[2]
+    text = re.findall(r"```toml\n(.*?)```", page, re.S)[0]
+    (tmp_path / "own.toml").write_text('base = "paper-2dof-nl-large"\n' + text)
+    losses = lm.load(tmp_path / "own.toml").gearbox.losses
+    assert isinstance(losses, lm.model.LossMap)
+    for load, row, told in zip(losses.loads[1:], losses.values[1:], re.findall(r"of (0\.\d+), (0\.\d+) and (0\.\d+)", text), strict=True):
+        assert [load / (load + loss) for loss in row] == pytest.approx([float(v) for v in told], abs=1e-4)

@@ -1,6 +1,8 @@
 """Drives in MuJoCo: against closed systems of equations, the exact core and standing still."""
 
 import math
+import re
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -8,6 +10,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lostmotion as lm
+from conftest import ROOT
 from refusals import refused, refuses
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
@@ -400,3 +403,18 @@ def test_a_slide_moves_as_its_axis_under_the_weight_of_the_robot() -> None:
         lm.mujoco.attach(model, {"table": inclined})
     assert "slides.table.inclination" in refusal.value.problems[0].keys
     assert lm.mujoco.attach(model, {"table": inclined}, replace=True).drives["table"].slides["table"].inclination == 0.0
+
+
+def test_the_thousand_robots_of_the_page_move_as_robots_of_their_own(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    code = next(c for c in re.findall(r"```python\n(.*?)```", (ROOT / "docs" / "robots.md").read_text(), re.S) if "ROBOTS" in c)
+    (tmp_path / "arm.xml").write_text(ARM.format(step=1e-3, world="", tip=""))
+    monkeypatch.chdir(tmp_path)
+    page: dict[str, Any] = {"__name__": "page"}
+    exec(code, page)
+    page["STEPS"] = 30
+    found = page["angles"](np.arange(3))
+    for k, angles in enumerate(found):
+        random, arm = np.random.default_rng(k), lm.mujoco.attach("arm.xml", page["DRIVES"])
+        for _ in range(30):
+            arm.step(dict(zip(page["DRIVES"], random.uniform(-0.2, 0.2, 2), strict=True)))
+        assert angles.tolist() == arm.data.qpos.tolist()

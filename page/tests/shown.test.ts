@@ -9,7 +9,7 @@ import { format, logarithmicTicks, shown, ticks } from "../src/units";
 
 test("units take the prefix that reads well", () => {
   expect(shown("rad", 3e-4)).toEqual({ unit: "arcmin", factor: Math.PI / 10800 });
-  expect(shown("rad", 0.8)).toEqual({ unit: "rad", factor: 1 });
+  expect(shown("rad", 0.8)).toEqual({ unit: "°", factor: Math.PI / 180 });
   expect(shown("N*m", 2.5)).toEqual({ unit: "N·m", factor: 1 });
   expect(shown("N*m", 4e3)).toEqual({ unit: "kN·m", factor: 1e3 });
   expect(shown("rad/s", 4e3)).toEqual({ unit: "rad/s", factor: 1 });

@@ -22,7 +22,7 @@ MANY = 12  # values of what a condition names, up to which they are listed
 def gathered(rig: Rig, directory: Path) -> tuple[list[Prepared], dict[str, str]]:
     """(the usable logs of a task, screened; reasons by name why the others cannot be used)."""
     task = rig.task
-    paths = find_logs(task.logs.files, directory)
+    paths = find_logs(task.logs.files, directory, task.logs.source)
     names = dict(zip(paths, distinct_names(paths), strict=True))
     logs: list[Prepared] = []
     left_out: dict[str, str] = {}

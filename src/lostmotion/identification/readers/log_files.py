@@ -100,8 +100,11 @@ def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
     return replace(log, name=path.name)
 
 
-def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
-    """Files by names or patterns (``*``, ``**``) relative to a directory; a directory stands for all logs in it."""
+def find_logs(patterns: Sequence[str], directory: Path, source: str = "") -> list[Path]:
+    """Files by names or patterns (``*``, ``**``) relative to a directory; a directory stands for all logs in it.
+
+    source: where they come from, for the error.
+    """
     found: list[Path] = []
     for pattern in patterns:
         path = directory / pattern
@@ -117,7 +120,8 @@ def find_logs(patterns: Sequence[str], directory: Path) -> list[Path]:
             matched = [path]
         named = [p for m in matched for p in (_within(m) if m.is_dir() else [m] if m.is_file() else [])]
         if not named:
-            raise InputError(f"{pattern!r} names no log in {directory.resolve()}; check the name", "logs.files")
+            remedy = f"the logs are not shipped: {source}" if source else "check the name"
+            raise InputError(f"{pattern!r} names no log in {directory.resolve()}; {remedy}", "logs.files")
         found += named
     return list(dict.fromkeys(found))
 

@@ -30,6 +30,7 @@ class LogFiles(Part):
 
     files: tuple[str, ...] = Field(min_length=1)
     """names or patterns, relative to the identification file; a directory stands for all logs in it"""
+    source: str = ""  #: where the files come from, which the error names if there are none
     time: str = ""  #: channel of the time, where it is not found by itself
     decimal: Literal["", ".", ","] = ""
     """decimal separator in text files; left out, a comma only if a file has no other reading, with a note"""
