@@ -353,6 +353,24 @@ def test_what_a_reduction_costs_is_stated() -> None:
     assert 1e-3 < found.error < 0.2
 
 
+TURNING = (
+    2.0 * 4.6 / 2000.0
+)  # twice the share of the steps in which the friction turns: it acts there for a part of the step, with both signs
+
+
+def test_a_motor_on_its_joint_is_reduced_to_its_own_numbers() -> None:
+    """As `lostmotion identify` writes an axis of one shaft: all inertia is that of the rotor, and the joint carries nothing else."""
+    motor = {"kind": "torque_source", "shaft": "table", "rotor_inertia": 0.02, "rated_torque": 1.0}
+    axis = lm.Scenario(
+        shafts={"table": {"friction_torque": 0.1, "viscous_friction": 0.05}},
+        motors={"drive": motor},
+        simulation={"duration": 1.0, "sample_interval": 1e-3},
+    )
+    found = lm.mujoco.reduce(axis, amplitude=0.5, frequency=1.0)
+    assert (found.armature, found.damping, found.frictionloss, found.gear) == pytest.approx((0.02, 0.05, 0.1, 1.0), rel=TURNING)
+    assert found.error < TURNING**0.5
+
+
 def test_the_drive_of_an_mjcf_joint_moves_as_that_joint() -> None:
     text = HINGE.replace('axis="0 0 1"', 'axis="0 1 0" armature="0.1" damping="0.3"').replace("0 0 0", "0 0 -9.81")
     text = text.replace("</worldbody>", '</worldbody><actuator><motor joint="hinge" gear="100"/></actuator>')

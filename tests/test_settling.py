@@ -120,7 +120,7 @@ def test_a_swing_within_the_window_is_watched_but_not_proved_to_stay_there() -> 
     assert (last.state, last.within) == ("settled, not proved", True)
     assert 0.0 <= last.time < 1.0
     assert (report.verdict.state, report.verdict.exit_code) == ("fits with a reservation", 0)
-    assert "after the last move it stays" not in str(report.verdict)
+    assert "without a proof that it stays" in str(report.verdict)
 
 
 def test_friction_brings_a_load_to_rest_on_the_flank_that_it_was_pushed_by() -> None:

@@ -32,7 +32,8 @@ class Reduction:
     frictionloss: float  #: [N·m] or [N]
     gear: float  #: torque or force on the joint over torque of the motor
     torque_error: float  #: root mean square [N·m] or [N] of what this leaves of the torque or force on the joint
-    torque: float  #: root mean square of the torque [N·m] or force [N] on the joint
+    torque: float
+    """root mean square of the torque [N·m] or force [N] on the joint; of the motor there, where the joint moves nothing but the drive"""
     slides: bool = False  #: whether the joint is a slide
 
     @property
@@ -124,8 +125,8 @@ def reduce(
         values = sign * _not_negative(sign * columns, target)
     left = target - columns @ values
     gear, armature, damping, loss = map(float, values)
-    error, torque = (float(np.sqrt(np.mean(x * x))) for x in (left, target))
-    return Reduction(armature, damping, loss, gear, error, torque, train.is_slide(joint))
+    error, torque, at_motor = (float(np.sqrt(np.mean(x * x))) for x in (left, target, gear * columns[:, 0]))
+    return Reduction(armature, damping, loss, gear, error, torque or at_motor, train.is_slide(joint))
 
 
 def _torque_source(train: DriveTrain) -> DriveTrain:

@@ -255,12 +255,16 @@ class ServoReport:
 
     def _proof(self, last: Settling) -> str:
         """Proof that the error stays within the window between moves and behind the last one, or how long it was watched."""
-        return self._held(last) if len(self.settling) == 1 else f"until the next move begins, {self._held(last)}"
+        if len(self.settling) == 1:
+            return self._held(last)
+        if last.state == "settled":
+            return f"{STAYS} and after the last move ({last.reason})"
+        return f"{STAYS}, {self._held(last)}"
 
     @staticmethod
     def _held(last: Settling) -> str:
-        proved = "it stays" if last.state == "settled" else "without a proof that it stays"
-        return f"after the last move {proved} ({last.reason})"
+        proved = "stays" if last.state == "settled" else "without a proof that it stays"
+        return f"{proved} after the last move ({last.reason})"
 
     @staticmethod
     def _swings(s: Settling) -> bool:
@@ -310,7 +314,7 @@ class ServoReport:
         if self.moves is not None:
             rows.append(("moves", self.repetition()))
         for s in self.settling:
-            until = self._held(s) if s.last else "until the next move begins"
+            until = self._held(s) if s.last else STAYS
             inside = f"{1e3 * s.time:.4g} ms, {until}" if s.within else f"{s.state}: {self._why(s)}"
             within = _shown(self.window, self.load_unit)
             rows.append((f"settled within {within} after the move to {self._place(s.to)}", inside))
@@ -496,6 +500,7 @@ def _stiffness(axis: Axis, regime: Regime) -> Stiffness:
 
 
 TRUE = "reference less true value"
+STAYS = "stays until the next move begins"
 SWINGS = 0.25  # of the error that is left: least amplitude that is reported as a swing
 
 
