@@ -217,7 +217,7 @@ def attach(
     samples
         Samples of this law within a step.
     dtype
-        Numbers of the drives: ``"float32"`` or ``"float64"``.
+        Numbers of the drives: ``"float32"`` or ``"float64"``. Where many steps are doubtful, a smaller step helps and ``"float64"`` does not.
     replace
         Whether weights, load torques and inclinations of a drive give way to those of the robot. False: they are refused.
 
