@@ -44,6 +44,7 @@ def test_the_answer_does_not_depend_on_whether_the_course_of_the_input_was_given
     given = identified(tmp_path, phase, 0.1, 'interpolation = "hold"')
     found = identified(tmp_path, phase, 0.1)
     assert any("held between samples" in text for text in found.inputs)
+    assert all(" rad with straight lines and " in text for text in found.inputs)
     for a, b in zip(found.rungs, given.rungs, strict=True):
         assert (a.train, a.held_out) == pytest.approx((b.train, b.held_out), rel=1e-3), a.name
         assert a.fit.point.values == pytest.approx(b.fit.point.values, rel=1e-3, abs=1e-9), a.name

@@ -84,6 +84,7 @@ def test_the_interpolation_of_a_smooth_command_is_that_of_its_sender(tmp_path: P
     result = identified(tmp_path, truth, None, 2.2e-3)
     (said,) = result.inputs
     assert said.startswith(f"drive_command: {'straight lines' if truth == 'linear' else 'held'} between samples, since")
+    assert " deviations with straight lines and " in said  # the task states them
     assert said in str(result) and not result.warnings()
     for name, value in TRUTH.items():
         i = result.intervals[name]

@@ -160,6 +160,18 @@ def test_a_reference_between_two_steps_is_never_reached() -> None:
     assert np.ptp(late) > 0.01 * step
 
 
+@pytest.mark.parametrize(("bits", "count"), [(19, 11562), (17, 2999), (20, 77771), (13, 333)])
+def test_a_reference_that_is_a_reading_to_rounding_is_one(bits: int, count: int) -> None:
+    """count * step / step may differ from count in the last bit, which winds up no integrator."""
+    step = 2.0 * math.pi / 2**bits
+    height = {"controllers/m/reference/steps": [{"time": 0.1, "height": count * step}]}
+    contact = sampled_slip(axis_of(rotor(SLIDING, step, **height)))
+    assert contact.offset == 0.0
+    assert sampled_slip(
+        axis_of(rotor(SLIDING, step, **{"controllers/m/reference/steps": [{"time": 0.1, "height": (count + 1e-6) * step}]}))
+    ).offset == pytest.approx(1e-6, rel=1e-3)
+
+
 @pytest.mark.parametrize(
     ("changes", "reason"),
     [

@@ -7,6 +7,7 @@ from typing import Literal
 
 import numpy as np
 
+from ...units.practical import printed
 from ..prepared_log import Prepared
 from ..rig.measured_motion_input import GIVEN_SPEED
 from ..rig.residuals import ParameterPoint
@@ -87,11 +88,19 @@ def nearer_ways(
         turned: Way = "hold" if way == "linear" else "linear"
         changed = with_ways(rig, {name: turned})
         other = fitted(changed, [replace(log, cache={}) for log in logs], start)
-        errors = {way: best.mae, turned: other.mae}
+        errors = {way: _shown(best.mae, rig), turned: _shown(other.mae, rig)}
         if other.mae < best.mae * (1.0 - NEARER):
             rig, best, way = changed, other, turned
         words[name] = (
-            f"{name}: {WORDS[way]}, since its samples do not tell, and fits have a mean absolute residual, relative "
-            f"to the deviations of the channels, of {errors['linear']:.4g} with straight lines and {errors['hold']:.4g} held"
+            f"{name}: {WORDS[way]}, since its samples do not tell, and fits have a mean absolute residual of "
+            f"{errors['linear']} with straight lines and {errors['hold']} held"
         )
     return rig, best.point, words
+
+
+def _shown(mae: float, rig: Rig) -> str:
+    """The error of a fit with its unit: deviations of the channels if the task gives them, else the SI unit of the channels."""
+    if all(deviation is not None for deviation in rig.deviations.values()):
+        return f"{mae:.4g} deviations"
+    units = {printed(rig.units[m.variable]) for m in rig.task.measured.values()}
+    return f"{mae:.4g} {units.pop() if len(units) == 1 else 'SI units'}"

@@ -27,6 +27,7 @@ from ..linear_regimes import Axis, model_at
 from .hunting_decision import FOREVER
 from .stuck_contact import NONE, AtRestError, UndecidableError, only_contact, others
 
+ROUNDING = 1e-15  # of a number of encoder steps, by which its computation may change it
 SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
 DOUBLINGS = 40  # of the time until what is not the ramp of the integrator has settled
 SETTLED = 1e-9  # relative change of the ramp from frame to frame
@@ -309,8 +310,11 @@ def _steps(axis: Axis, encoder: str) -> tuple[float, float]:
     step = 0.0 if c.encoder is None else c.encoder.step
     if step == 0.0:
         return 0.0, 0.0
-    value = c.reference.pieces()[-1][1] * (turns(train, encoder, axis.shaft) or 1.0)
-    return step, value / step - round(value / step)
+    count = c.reference.pieces()[-1][1] * (turns(train, encoder, axis.shaft) or 1.0) / step
+    offset = count - round(count)
+    return step, offset if abs(offset) > ROUNDING * abs(
+        count
+    ) else 0.0  # a multiple of the step, to rounding, is a reading
 
 
 def _limits(
