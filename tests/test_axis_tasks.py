@@ -22,24 +22,11 @@ from lostmotion.studies.selection.task_file import task_of
 from refusals import refused, refuses
 
 G = 9.80665
-MOTOR: dict[str, Any] = {
-    "rotor_inertia": 1e-5,
-    "rated_torque": 0.4,
-    "rated_speed": 400.0,
-    "rated_voltage": 48.0,
-    "electrical_time_constant": 5e-4,
-    "armature_voltage_constant": 10.0,
-    "voltage_limit": 48.0,
-    "limits": {"continuous_torque": 0.5, "resistance": 1.0, "torque_constant": 0.1, "max_current": 20.0},
-}
-GEARBOX: dict[str, Any] = {
-    "ratio": 100.0,
-    "inertia": 2e-6,
-    "rated_input_speed": 300.0,
-    "rated_output_torque": 40.0,
-    "stiffness": {"kind": "linear", "stiffness": 2e4},
-    "losses": {"kind": "constant_efficiency", "efficiency": 0.8},
-}
+LIMITS = {"continuous_torque": 0.5, "resistance": 1.0, "torque_constant": 0.1, "max_current": 20.0}
+MOTOR: dict[str, Any] = {"rotor_inertia": 1e-5, "rated_torque": 0.4, "rated_speed": 400.0, "rated_voltage": 48.0, "voltage_limit": 48.0}
+MOTOR |= {"electrical_time_constant": 5e-4, "armature_voltage_constant": 10.0, "limits": LIMITS}
+GEARBOX: dict[str, Any] = {"ratio": 100.0, "inertia": 2e-6, "rated_input_speed": 300.0, "rated_output_torque": 40.0}
+GEARBOX |= {"stiffness": {"kind": "linear", "stiffness": 2e4}, "losses": {"kind": "constant_efficiency", "efficiency": 0.8}}
 REFERENCE = {"kind": "position", "speed": 1.0, "acceleration": 5.0, "moves": [{"to": 1.2, "dwell": 0.6}, {"to": 0.0}]}
 ARM: dict[str, Any] = {
     "task": {"cycle": "4 s", "gravity": {"mass": 2.0, "radius": 0.5}, "hold_without_power": False},
@@ -55,12 +42,8 @@ SLIDE: dict[str, Any] = {
     "screw": {"lead": "10 mm", "efficiency": 0.9, "inertia": "3e-5 kg m^2", "stiffness": "90 N/um", "drag_torque": "0.03 N m"},
     "controller": {
         "encoder": {"bits": 20},
-        "reference": {
-            "kind": "position",
-            "speed": "300 mm/s",
-            "acceleration": "3 m/s^2",
-            "moves": [{"to": "200 mm", "dwell": "0.2 s"}, {"to": "0 mm"}],
-        },
+        "reference": {"kind": "position", "speed": "300 mm/s", "acceleration": "3 m/s^2"}
+        | {"moves": [{"to": "200 mm", "dwell": "0.2 s"}, {"to": "0 mm"}]},
     },
     "motor": MOTOR | {"limits": MOTOR["limits"] | {"max_current": 40.0}},
     "vary": [{"key": "motor.rotor_inertia", "values": [2e-5]}],
@@ -104,7 +87,7 @@ def test_a_measured_motion_comes_from_a_file(tmp_path, slides: bool):
 
 
 def test_gravity_of_an_arm():
-    """Hanging at 0, so that 2 kg at 0.5 m pull with m g r sin(1.2) at the end of the move, and nothing at its begin."""
+    """Hanging at 0, so that 2 kg at 0.5 m pull with m g r sin(1.2) at the end of the move, and nothing at its start."""
     motion = motion_of(Duty(gravity=ArmGravity(mass=2.0, radius=0.5)))
     assert at(motion, 1.7, motion.torque) == pytest.approx(2.0 * G * 0.5 * math.sin(1.2), rel=1e-9)
     assert at(motion, 0.0, motion.holding) == pytest.approx(0.0, abs=1e-9)

@@ -317,10 +317,9 @@ def test_limit_cycle_with_static_friction_is_that_of_the_closed_form() -> None:
         assert cycle.multipliers[0] == pytest.approx(((ends[1] - ends[0]) / (2.0 * h)) ** 2, rel=1e-6)
 
 
-def test_without_static_friction_there_is_none_and_why() -> None:
-    cycle = lm.servo.limit_cycle(inertia(0.3, 0.3, 100.0))
-    assert not cycle.cycles
-    assert repr(cycle).startswith("no limit cycle: it comes to rest")
+def test_without_static_friction_or_with_a_small_gain_there_is_none_and_why() -> None:
+    assert repr(lm.servo.limit_cycle(inertia(0.3, 0.3, 100.0))).startswith("no limit cycle: it comes to rest")
+    assert not lm.servo.limit_cycle(play_loop(2.0, 1e-4)).cycles
 
 
 def play(gain: float) -> tuple[float, float]:
@@ -383,11 +382,6 @@ def test_limit_cycle_of_a_play_is_that_of_the_closed_form_and_the_published_one(
     assert np.all(errors[1] < 0.12 * errors[0] + 1.2e-6)
 
 
-def test_a_play_with_a_small_gain_has_none() -> None:
-    cycle = lm.servo.limit_cycle(play_loop(2.0, 1e-4))
-    assert not cycle.cycles
-
-
 # --- systems of other libraries, input that is refused, maps ---
 
 
@@ -426,18 +420,17 @@ REFUSED = [
     ({"position": {"gain": 1.0, "filter_time": 0.1}}, "has filter_time but no derivative_gain"),
     ({"position": None, "state_space": {"A": [[1.0, 2.0]], "B": [[1.0]], "C": [1.0], "D": [0.0]}}, "A must be 1 x 1"),
     ({"limit": -1.0}, "limit: -1.0 must be greater than 0"),
+    (
+        {"position": {"gain": 1.0, "derivative_gain": 0.1, "derivative_weight": 1.0}}
+        | {"reference": {"kind": "position", "steps": [{"time": 0.1, "height": 1.0}]}},
+        "give a filter_time",
+    ),
 ]
 
 
 @pytest.mark.parametrize(("changes", "message"), REFUSED, ids=[m[:30] for _, m in REFUSED])
 def test_what_cannot_be_used_is_refused_in_one_line(changes: dict[str, Any], message: str) -> None:
     assert "controllers.servo" in refused(lambda: two_masses(**changes), match=message)
-
-
-def test_a_derivative_of_a_reference_with_steps_needs_a_filter() -> None:
-    pid = {"gain": 1.0, "derivative_gain": 0.1, "derivative_weight": 1.0}
-    step = {"kind": "position", "steps": [{"time": 0.1, "height": 1.0}]}
-    refused(lambda: two_masses(position=pid, reference=step), "controllers.servo")
 
 
 def test_a_map_has_the_limit_cycles_of_its_points() -> None:

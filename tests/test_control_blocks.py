@@ -120,7 +120,7 @@ def recomputed(control: Callable[[int, np.ndarray], float], load: Callable[[floa
 
 def simulated(controller: dict[str, Any], torque: Any = None) -> Any:
     """The same by the solver."""
-    base: dict[str, Any] = {"sample_time": T, "encoder": {"lines": 256}, "speed": {"gain": 0.1, "integral_gain": 2.0}}
+    base: dict[str, Any] = {"sample_time": T, "encoder": {"lines": 256}, "speed": {"gain": 0.05, "integral_gain": 1.0}}
     return lm.simulate(
         lm.Scenario(
             shafts={
@@ -237,7 +237,6 @@ def test_backlash_is_crossed_at_its_rate_when_the_reference_turns() -> None:
         {
             "reference": {"kind": "position", "ramps": ramps},
             "position": {"gain": 25.0},
-            "speed": {"gain": 0.05, "integral_gain": 1.0},
             "feedforward": {"backlash": gap, "backlash_rate": rate},
         }
     )
@@ -264,28 +263,14 @@ def test_the_integrator_of_the_position_holds_within_its_dead_zone_until_it_is_l
         return loop(state["wanted"], estimate(angle, 0.0))
 
     states = recomputed(control, load)
-    steps = [{"height": 0.6, "time": 0.15}, {"height": -0.6, "time": 0.22}]
-    result = simulated(
-        {
-            "reference": {"kind": "position", "mean": 0.05},
-            "encoder": {"lines": 512},
-            "position": {"gain": 25.0, "integral_gain": 400.0, "dead_zone": list(zone), "sample_time": 4 * T},
-            "speed": {"gain": 0.05, "integral_gain": 0.5},
-        },
-        {"steps": steps},
-    )
+    steps = {"steps": [{"height": 0.6, "time": 0.15}, {"height": -0.6, "time": 0.22}]}
+    position = {"gain": 25.0, "integral_gain": 400.0, "sample_time": 4 * T}
+    controller = {"reference": {"kind": "position", "mean": 0.05}, "encoder": {"lines": 512}, "speed": {"gain": 0.05, "integral_gain": 0.5}}
+    result = simulated(controller | {"position": position | {"dead_zone": list(zone)}}, steps)
     agree(result, states)
     changes = sum(a != b for a, b in itertools.pairwise(held))
     assert changes >= 3  # it held, was pushed out, and held again
-    plain = simulated(
-        {
-            "reference": {"kind": "position", "mean": 0.05},
-            "encoder": {"lines": 512},
-            "position": {"gain": 25.0, "integral_gain": 400.0, "sample_time": 4 * T},
-            "speed": {"gain": 0.05, "integral_gain": 0.5},
-        },
-        {"steps": steps},
-    )
+    plain = simulated(controller | {"position": position}, steps)
     assert float(abs(plain["load_angle"] - result["load_angle"]).max()) > 1e-4
 
 
@@ -429,7 +414,6 @@ def test_a_camera_shows_where_the_target_was_and_the_loops_follow_what_the_track
             "encoder": {"lines": 64},
             "position_encoder": {"shaft": "load", "bits": 14},
             "position": {"gain": 25.0, "feedforward": 0.9, "sample_time": 4 * T},
-            "speed": {"gain": 0.05, "integral_gain": 1.0},
             "camera": {
                 "sample_time": t_frame, "latency": late * T, "pixel": pixel, "pixel_parts": parts, "noise": sigma,
                 "seed": seed, "field": 2.0 * half_field,

@@ -1,7 +1,5 @@
 """End stops: elastic, damped and rigid ones, of slides and shafts, in each form of a scenario."""
 
-from __future__ import annotations
-
 import math
 import tomllib
 from typing import Any
@@ -94,22 +92,12 @@ def test_damped_stops_let_go_where_their_force_vanishes() -> None:
 
 
 CRASH = """
-    [slides.table]
-    mass = "50 kg"
-    end_stops = { lower = "-1 m", upper = "10 mm", stiffness = "5 N/um" }
-    [shafts.motor]
-    inertia = "5e-4 kg m^2"
-    [screws.screw]
-    input = "motor"
-    output = "table"
-    lead = "10 mm"
-    stiffness = "100 N/um"
-    [initial]
-    slide_speeds.table = "0.5 m/s"
-    speeds.motor = "314.159265359 rad/s"
-    [simulation]
-    duration = "0.1 s"
-    sample_interval = "0.02 ms"
+slides.table = { mass = "50 kg", end_stops = { lower = "-1 m", upper = "10 mm", stiffness = "5 N/um" } }
+shafts.motor = { inertia = "5e-4 kg m^2" }
+screws.screw = { input = "motor", output = "table", lead = "10 mm", stiffness = "100 N/um" }
+initial.slide_speeds = { table = "0.5 m/s" }
+initial.speeds = { motor = "314.159265359 rad/s" }
+simulation = { duration = "0.1 s", sample_interval = "0.02 ms" }
 """
 
 
@@ -224,14 +212,11 @@ def test_what_is_no_stop_is_refused(stops: dict[str, Any], key: str) -> None:
     refused(lambda: ball(stops), key)
 
 
-@pytest.mark.parametrize(("height", "speed", "refused"), [(-0.1, 0.0, True), (0.0, -1.0, True), (0.0, 0.0, False), (0.0, 1.0, False)])
-def test_a_run_begins_between_rigid_stops(height: float, speed: float, refused: bool) -> None:
-    if not refused:
-        assert np.isfinite(lm.simulate(ball({"restitution": 0.5}, height, speed, duration=0.01))["ball_position"][-1])
-        return
-    with pytest.raises(InputError) as why:
-        ball({"restitution": 0.5}, height, speed)
-    assert [problem.keys for problem in why.value.problems] == [("initial.positions.ball",)]
+def test_a_run_begins_between_rigid_stops() -> None:
+    for height, speed in ((-0.1, 0.0), (0.0, -1.0)):
+        refused(lambda at=(height, speed): ball({"restitution": 0.5}, *at), "initial.positions.ball")
+    for speed in (0.0, 1.0):
+        assert np.isfinite(lm.simulate(ball({"restitution": 0.5}, 0.0, speed, duration=0.01))["ball_position"][-1])
 
 
 def test_a_run_goes_on_from_a_stop_that_it_rests_on() -> None:

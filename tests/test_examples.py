@@ -1,10 +1,13 @@
 """The examples on controllers: a compiled law, a filter from python-control, an environment for reinforcement learning."""
 
 import importlib.util
+import json
 import sys
+from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+import matplotlib as mpl
 import numpy as np
 import pytest
 
@@ -104,3 +107,30 @@ def test_the_batch_of_axes_is_a_vectorised_environment() -> None:
     assert not ended.any()
     # A proportional law with damping comes near, but for the friction over its gain.
     assert np.abs(seen[:, 0]).max() * module.SCALES[0] < 0.2 * module.REACH
+
+
+# --- the notebooks of the documentation run from the first cell to the last, and are stored without output ---
+
+
+NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
+
+
+def test_the_three_main_paths_have_a_notebook() -> None:
+    assert [path.stem for path in NOTEBOOKS] == ["commission", "data-sheet", "identify"]
+    home = (ROOT / "docs" / "index.md").read_text()
+    assert all(f"notebooks/{path.stem}\n" in home for path in NOTEBOOKS)
+
+
+@pytest.mark.parametrize("path", NOTEBOOKS, ids=lambda p: p.stem)
+def test_a_notebook_runs(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    mpl.use("Agg")
+    cells = json.loads(path.read_text())["cells"]
+    assert "This notebook is for" in "".join(cells[0]["source"])
+    names: dict[str, Any] = {}
+    for cell in cells:
+        if cell["cell_type"] == "code":
+            assert cell["outputs"] == [] and cell["execution_count"] is None
+            exec(compile("".join(cell["source"]), path.name, "exec"), names)
+    mpl.pyplot.close("all")
+    assert list(tmp_path.iterdir()) == []  # a notebook leaves nothing behind

@@ -148,7 +148,9 @@ def test_the_limits_of_the_goal_are_those_of_an_identification() -> None:
 
 
 def test_without_sample_time_the_motion_is_that_of_an_integrator() -> None:
-    run = lm.simulate(axis(continuous(SERVO)))
+    scenario = axis(continuous(SERVO))
+    run, adaptive = lm.simulate(scenario), lm.simulate(scenario, solver="dormand-prince")
+    assert np.max(np.abs(run["arm_angle"].values - adaptive["arm_angle"].values)) < 1e-7
 
     def rate(t: float, x: np.ndarray) -> list[float]:
         error = (1.0 if t >= 0.05 else 0.0) - x[2]
@@ -160,12 +162,6 @@ def test_without_sample_time_the_motion_is_that_of_an_integrator() -> None:
     assert np.max(np.abs(run["arm_angle"].values[after] - found.y[0])) < 2e-7  # kinks of the law, stepped over at 1e-9
     assert np.max(np.abs(run["arm_angle"].values[~after])) == 0.0
     assert run["servo_command"].values.max() * 2.0 == pytest.approx(3.5 * 0.6), "the current is limited"
-
-
-def test_both_solvers_agree_on_the_pieces_of_a_duty_cycle() -> None:
-    scenario = axis(continuous(SERVO))
-    exact, adaptive = lm.simulate(scenario), lm.simulate(scenario, solver="dormand-prince")
-    assert np.max(np.abs(exact["arm_angle"].values - adaptive["arm_angle"].values)) < 1e-7
 
 
 def test_a_straight_table_is_a_position_gain_and_a_viscous_friction() -> None:
@@ -222,32 +218,28 @@ def test_torque_in_python_is_that_of_the_core() -> None:
 
 
 @pytest.mark.parametrize(
-    ("make", "changes", "message"),
+    ("make", "firmware", "changes", "message"),
     [
-        (continuous, {"supply_resistance": 1.0}, r"firmware\.supply_resistance: makes the torque depend on error and speed"),
-        (continuous, {"goal_rate_limit": 4.0}, r"firmware\.goal_rate_limit: acts from sample to sample"),
-        (continuous, {"goal_acceleration_limit": 4.0}, r"firmware\.goal_acceleration_limit: acts from sample to"),
-        (continuous, {"goal_filter_time": 4e-3}, r"firmware\.goal_filter_time: acts from sample to sample"),
-        (sampled, {"goal_rate_limit": 0.0}, r"goal_rate_limit"),
-        (sampled, {"duty": {"errors": [0.0, 0.1, 0.1], "values": [0.0, 0.5, 0.6]}}, "errors that do not rise"),
-        (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.1, 0.5]}}, "does not begin at 0"),
-        (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.0, 1.5]}}, "1.5"),
-        (sampled, {"resistance": 0.0}, "resistance"),
+        (continuous, {"supply_resistance": 1.0}, {}, r"firmware\.supply_resistance: makes the torque depend on error and speed"),
+        (continuous, {"goal_rate_limit": 4.0}, {}, r"firmware\.goal_rate_limit: acts from sample to sample"),
+        (continuous, {"goal_acceleration_limit": 4.0}, {}, r"firmware\.goal_acceleration_limit: acts from sample to"),
+        (continuous, {"goal_filter_time": 4e-3}, {}, r"firmware\.goal_filter_time: acts from sample to sample"),
+        (sampled, {"goal_rate_limit": 0.0}, {}, r"goal_rate_limit"),
+        (sampled, {"duty": {"errors": [0.0, 0.1, 0.1], "values": [0.0, 0.5, 0.6]}}, {}, "errors that do not rise"),
+        (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.1, 0.5]}}, {}, "does not begin at 0"),
+        (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.0, 1.5]}}, {}, "1.5"),
+        (sampled, {"resistance": 0.0}, {}, "resistance"),
+        (sampled, {}, {"current": {"kind": "pi"}}, "which commands the voltage"),
+        (sampled, {}, {"law": True}, "both are the loops"),
+        (sampled, {}, {"reference": {"kind": "speed", "mean": 1.0}}, "reference.kind"),
+        (sampled, {}, {"position": {"gain": 10.0}}, "has no use with a firmware"),
+        (sampled, {}, {"encoder": None}, "lacks encoder"),
     ],
 )
-def test_bad_firmware_is_refused(make: Any, changes: dict[str, Any], message: str) -> None:
+def test_bad_firmware_is_refused(make: Any, firmware: dict[str, Any], changes: dict[str, Any], message: str) -> None:
     with pytest.raises((InputError, ValueError), match=message):
-        lm.simulate(axis(make(SERVO | changes)))
+        axis(make(SERVO | firmware, **changes))
 
 
-def test_what_does_not_go_with_a_firmware_is_refused() -> None:
-    for changes, message in (
-        ({"current": {"kind": "pi"}}, "which commands the voltage"),
-        ({"law": True}, "both are the loops"),
-        ({"reference": {"kind": "speed", "mean": 1.0}}, "reference.kind"),
-        ({"position": {"gain": 10.0}}, "has no use with a firmware"),
-        ({"encoder": None}, "lacks encoder"),
-    ):
-        with pytest.raises((InputError, ValueError), match=message):
-            axis(sampled(SERVO, **changes))
-    assert "duty cycle is not linear" in refused(lambda: lm.commission(axis(sampled(SERVO))))
+def test_no_gains_are_found_for_a_duty_cycle() -> None:
+    refused(lambda: lm.commission(axis(sampled(SERVO))), match="duty cycle is not linear")

@@ -1,20 +1,32 @@
 """The rules of the house: one-way imports, quick start-up, stub and docs in step with the code."""
 
 import ast
+import math
 import re
 import runpy
 import subprocess
 import sys
+import typing
 from graphlib import TopologicalSorter
 from pathlib import Path
 from types import FrameType
 from typing import Any
 
+import numpy as np
 import pytest
+from pydantic import BaseModel
+from scipy.interpolate import CubicSpline
 
 import lostmotion
+import lostmotion as lm
 from conftest import ROOT, run_in_build
+from lostmotion import _core
+from lostmotion import reproducible as r
 from lostmotion.inputs import core_parameters
+from lostmotion.model.drive import Drive
+from lostmotion.studies.runs.read_table import read_table
+from lostmotion.studies.runs.runs_in_core import core_can
+from lostmotion.units.conversion import Unit
 from public_names import PATHS, public
 
 PACKAGE = ROOT / "src" / "lostmotion"
@@ -316,3 +328,182 @@ def test_examples_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "argv", [str(path)])
     runpy.run_path(str(path), run_name="__main__")
+
+
+# --- the core's tables of names and parameters, from which Python and the binding are made ---
+
+
+# What the core has no use for as it stands in a file: ratings, texts, the two voltages of which it takes the ratio, and what
+# makes a synchronous motor a DC motor.
+# The line of a motor becomes its rated point.
+LINE = {"motor.stall_torque", "motor.no_load_speed", "motor.stall_current", "motor.no_load_current"}
+NOT_OF_THE_CORE = {"motor.rated_voltage", "motor.voltage_limit", "motor.dc_voltage"} | LINE
+# A stiffness of the kind rigid has the flanks of a gear.
+OF_THE_CORE_ALONE = {"motor.command_limit", "gearbox.flanks.backlash", "gearbox.flanks.restitution"}
+
+
+def plain_numbers(part: Any, prefix: str) -> dict[str, str]:
+    """Units of all fields of a part that are single numbers, by dotted key, laws of compliance and losses included."""
+    found = {}
+    for name, field in part.model_fields.items():
+        if name in ("limits", "winding"):
+            continue
+        key = f"{prefix}{name}"
+        units = [m.unit for m in (*field.metadata, *annotations_in(field.annotation)) if isinstance(m, Unit)]
+        models = [a for a in (field.annotation, *typing.get_args(field.annotation)) if is_model(a)]
+        if units and not models and "tuple" not in str(field.annotation):
+            found[key] = units[0]
+        for model in models:
+            found |= plain_numbers(model, f"{key}.")
+    return found
+
+
+def is_model(annotation: Any) -> bool:
+    return isinstance(annotation, type) and issubclass(annotation, BaseModel)
+
+
+def annotations_in(annotation: Any) -> list[Any]:
+    nested = [annotations_in(a) for a in typing.get_args(annotation)]
+    return [*getattr(annotation, "__metadata__", ()), *(m for each in nested for m in each)]
+
+
+def test_every_number_of_a_drive_is_a_parameter_of_the_core_with_the_same_unit() -> None:
+    ours = plain_numbers(Drive, "")
+    curves = ("gearbox.stiffness.", "gearbox.mesh_stiffness.")  # become the curves of the core
+    ours = {key: unit for key, unit in ours.items() if not key.startswith(curves)}
+    assert ours.keys() >= {"motor.rotor_inertia", "gearbox.hysteresis.efficiency", "load.friction_torque"}
+    core = dict(_core.parameters())
+    assert core.keys() - OF_THE_CORE_ALONE == ours.keys() - NOT_OF_THE_CORE
+    assert {key: core[key] for key in core.keys() & ours} == {key: ours[key] for key in core.keys() & ours}
+
+
+def test_a_drive_of_the_core_refuses_a_parameter_that_it_does_not_know() -> None:
+    with pytest.raises(ValueError, match=r"unknown keys among .*mass"):
+        _core.Train().add_motor("m", shaft="motor", fields={"mass": 1.0})
+
+
+def test_the_states_are_variables_and_what_a_run_can_start_from() -> None:
+    names = _core.states()
+    assert names == [n for n in lm.Initial.model_fields if n not in ("hysteresis_capacity", "on_reference")]
+    assert set(names) <= {v.name for v in lm.simulation.VARIABLES}
+
+
+def test_a_constant_efficiency_varies_in_the_core_as_in_single_runs(tmp_path: Path) -> None:
+    base = lm.load(ROOT / "scenarios" / "paper-2dof-l-large.toml", ["simulation.duration=0.2"])
+    study = lm.studies.Study(
+        scenario=base, vary=[{"key": "gearbox.losses.efficiency", "values": [0.6, 0.7]}], keep={"end": "final(load_angle)"}
+    )
+    assert core_can(study)
+    rows = read_table(lm.study(study, tmp_path / "s")).to_pydict()
+    for value, end in zip((0.6, 0.7), rows["end"], strict=True):
+        single = lm.simulate(base.replace(**{"gearbox.losses.efficiency": value}))
+        assert end == float(single["load_angle"][-1])
+    assert len(set(rows["end"])) == 2
+
+
+def test_names_of_the_ledger_add_up_to_the_balance() -> None:
+    result = lm.simulate(lm.load(ROOT / "scenarios" / "paper-2dof-nl-small.toml", ["simulation.duration=0.5"]))
+    e = lm.energy_of(result)
+    lost = sum(e[n] for n in _core.energy_entries()[1:8])
+    assert e["source"] - lost - e["kinetic_change"] - e["elastic_change"] == pytest.approx(e["residual"], abs=1e-12 * e["turned_over"])
+
+
+def test_a_cause_s_number_goes_with_what_the_contacts_do() -> None:
+    result = lm.simulate(lm.load(ROOT / "scenarios" / "paper-2dof-nl-small.toml"))
+    s = lm.switchings_of(result)
+    flags, meanings = s["cause"].attrs["flag_values"], s["cause"].attrs["flag_meanings"].split()
+    assert len(flags) == len(meanings)
+    of = dict(zip(meanings, flags, strict=False))
+    rest = s["cause"].values == of["came_to_rest"]
+    contacts = [name.removesuffix("_before") for name in s if str(name).endswith("contact_before")]
+    before = np.stack([s[f"{c}_before"].values for c in contacts])
+    after = np.stack([s[f"{c}_after"].values for c in contacts])
+    # Where a contact has come to rest one was slipping before; where one has broken away one was stuck.
+    assert rest.any() and (np.abs(before[:, rest]) == 1).any(axis=0).all()
+    free = s["cause"].values == of["broke_away"]
+    assert free.any() and ((before[:, free] == 0) & (np.abs(after[:, free]) == 1)).any(axis=0).all()
+
+
+# --- functions that give the same bits on every platform, against NumPy and SciPy; their errors are tested in the core ---
+
+
+RANDOM = np.random.default_rng(5)
+ULP = 2.0**-52  # relative, at most
+ANGLES = np.concatenate([RANDOM.uniform(-20.0, 20.0, 2000), RANDOM.uniform(-1e9, 1e9, 200), [0.0, -0.0]])
+POSITIVE = np.exp(RANDOM.uniform(-300.0, 300.0, 2000))
+NEAR_ONE = RANDOM.uniform(0.1, 10.0, 2000)
+
+
+# The functions of NumPy are good to 4 units in the last place or better.
+@pytest.mark.parametrize(
+    ("own", "other", "x", "units"),
+    [
+        (r.sin, np.sin, ANGLES, 5.0),
+        (r.cos, np.cos, ANGLES, 5.0),
+        (r.tan, np.tan, ANGLES, 7.0),
+        (r.exp, np.exp, ANGLES[:2000], 6.0),
+        (r.expm1, np.expm1, np.concatenate([ANGLES[:2000], 1e-9 * ANGLES]), 7.0),
+        (r.log, np.log, POSITIVE, 6.0),
+        (r.cbrt, np.cbrt, np.concatenate([POSITIVE, -POSITIVE]), 5.0),
+    ],
+)
+def test_functions_of_one_number_are_those_of_numpy(own, other, x, units) -> None:
+    wanted = other(x)
+    assert np.all(np.abs(own(x) - wanted) <= units * ULP * np.abs(wanted))
+    assert own(float(x[3])) == own(x)[3]
+    assert isinstance(own(float(x[3])), float)
+    assert own(x.reshape(2, -1)).shape == (2, x.size // 2)
+
+
+def test_functions_of_two_numbers_are_those_of_numpy() -> None:
+    y, x = RANDOM.uniform(-1.0, 1.0, (2, 2000))
+    wanted = np.arctan2(y, x)
+    assert np.all(np.abs(r.arctan2(y, x) - wanted) <= 6.0 * ULP * np.abs(wanted))
+    assert r.arctan2(0.0, -1.0) == math.pi
+    assert r.arctan(1.0) == math.pi / 4.0
+    exponent = 3.0 * x
+    bound = (6.0 + 3.0 * np.abs(exponent * np.log(NEAR_ONE))) * ULP
+    assert np.all(np.abs(r.power(NEAR_ONE, exponent) / NEAR_ONE**exponent - 1.0) <= bound)
+    assert r.log10(1000.0) == pytest.approx(3.0, rel=4.0 * ULP)
+
+
+def test_ends_of_the_range() -> None:
+    with np.errstate(all="ignore"):
+        assert np.isnan(r.sin(np.array([np.nan, np.inf]))).all()
+        assert r.exp(np.array([-np.inf, 800.0, -800.0])).tolist() == [0.0, math.inf, 0.0]
+        assert r.log(np.array([0.0, np.inf])).tolist() == [-math.inf, math.inf]
+        assert np.isnan(r.log(-1.0))
+        assert r.power(np.array([0.0, 0.0]), np.array([2.0, 0.0])).tolist() == [0.0, 1.0]
+    assert abs(r.sin(1e13)) <= 1.0
+
+
+def test_straight_lines_are_those_of_numpy() -> None:
+    points, values = np.cumsum(RANDOM.uniform(0.1, 1.0, 12)), RANDOM.normal(size=12)
+    x = np.concatenate([RANDOM.uniform(-1.0, points[-1] + 1.0, 500), points])
+    assert np.allclose(r.interpolate(x, points, values), np.interp(x, points, values), rtol=0.0, atol=1e-14)
+    assert r.interpolate(points, points, values).tolist() == values.tolist()
+    assert r.interpolate(5.0, [1.0], [7.0]) == 7.0
+
+
+@pytest.mark.parametrize("points", [2, 3, 4, 5, 40])
+@pytest.mark.parametrize("channels", [(), (3,)])
+def test_cubic_splines_are_those_of_scipy(points: int, channels: tuple[int, ...]) -> None:
+    times = np.cumsum(RANDOM.uniform(0.05, 1.0, points))
+    values = RANDOM.normal(size=(points, *channels))
+    # Slopes are rounded to about the condition of the system, below 10, times the values over the least interval.
+    assert np.allclose(r.cubic_spline(times, values), CubicSpline(times, values).c[::-1], rtol=1e-10, atol=1e-9)
+
+
+@pytest.mark.parametrize("n", [1, 2, 7, 16, 60, 97, 360, 1024])
+def test_fourier_sums_are_those_of_numpy(n: int) -> None:
+    x, y = RANDOM.normal(size=(2, n))
+    real, imaginary = r.fourier_sum(x, y)
+    wanted = n * np.fft.ifft(x + 1j * y)
+    # Each of n terms is rounded a few times, of the size of the numbers summed.
+    assert np.abs(real + 1j * imaginary - wanted).max() <= 4.0 * ULP * n * math.log2(n + 1)
+
+
+def test_sums_are_made_one_by_one() -> None:
+    """Python compensates `sum` from 3.12 on: 1 + 1e-16 + 1e-16 would be 1 + 2.2e-16."""
+    assert r.total([1.0, 1e-16, 1e-16]) == 1.0
+    assert r.total([0.1, 0.2], 0.3) == (0.3 + 0.1) + 0.2

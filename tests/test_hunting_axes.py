@@ -8,7 +8,6 @@ import numpy as np
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.servo.hunting.limit_cycle_causes import without_backlash, without_friction
 from lostmotion.servo.hunting.limit_cycles import UndrivenLoop
 
 AXES = some(24, 12)
@@ -165,16 +164,3 @@ def test_verdicts_of_random_axes_are_those_of_exact_runs() -> None:
     print(counts)
     assert min(counts["hunts"], counts["does not hunt"]) >= 0.2 * AXES, counts
     assert counts["not decided"] < 0.15 * AXES, counts
-
-
-def test_a_slide_and_its_screw_are_left_without_friction_and_play_as_shafts_and_gears_are() -> None:
-    axis = lm.load("ball-screw-axis").long()
-    smooth, tight = without_friction(axis), without_backlash(axis)
-    assert smooth is not None
-    assert tight is not None
-    assert axis.slides["slide"].friction_force > 0.0
-    assert axis.screws["screw"].backlash == 2e-6
-    lost = [value for entry, value in lm.simulate(smooth).lm.energy.items() if "dry friction" in entry]
-    assert not any(lost)
-    assert tight.screws["screw"].backlash == 0.0
-    assert without_backlash(tight) is without_friction(smooth) is None

@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
+from lostmotion.servo.hunting.limit_cycle_causes import without_backlash, without_friction
 from refusals import refused
 
 INERTIA, K_P, K_I, K_D = 0.5, 50.0, 120.0, 8.0
@@ -92,6 +93,13 @@ def test_the_fixed_point_is_the_limit_cycle_that_newtons_method_finds() -> None:
     assert point.stable
     assert cycle.stable
     assert "stable limit cycle of 0.35196" in repr(certificate)
+    axis = lm.load("ball-screw-axis").long()  # a slide and its screw are left without friction and play as shafts and gears are
+    smooth, tight = without_friction(axis), without_backlash(axis)
+    assert smooth is not None and tight is not None
+    assert (axis.slides["slide"].friction_force > 0.0, axis.screws["screw"].backlash) == (True, 2e-6)
+    assert not any(value for entry, value in lm.simulate(smooth).lm.energy.items() if "dry friction" in entry)
+    assert tight.screws["screw"].backlash == 0.0
+    assert without_backlash(tight) is without_friction(smooth) is None
 
 
 def test_what_keeps_an_axis_from_hunting_is_named() -> None:

@@ -1,7 +1,5 @@
 """Measured motion as an input of identification: the torque that it takes is what is fitted."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -18,18 +16,10 @@ from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification
 
 RIG = """
-[shafts.crank]
-inertia = 2e-3
-speed = { mean = 0.0 }
-[shafts.lever]
-inertia = 5e-3
-[gears.mesh]
-input = "crank"
-output = "lever"
-ratio = 2
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
+shafts.crank = { inertia = 2e-3, speed = { mean = 0.0 } }
+shafts.lever = { inertia = 5e-3 }
+gears.mesh = { input = "crank", output = "lever", ratio = 2 }
+simulation = { duration = "1 s", sample_interval = "1 ms" }
 """
 TRUTH = {"inertia": 5e-3, "coulomb": 0.05, "viscous": 2e-3}  # of the lever; on the crank a quarter or a half of it
 NOISE = 2e-3  # N*m, of the torque sensor

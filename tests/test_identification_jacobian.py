@@ -1,7 +1,5 @@
 """Derivatives of the residuals of logs: exact where they exist, by differences where not, and said so."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from pathlib import Path
 
@@ -81,16 +79,10 @@ def test_scale_offset_delay_and_filter_of_channels_are_parameters_too() -> None:
 
 
 AXIS = """
-[shafts.motor]
-friction_torque = "0.02 N*m"
-[shafts.table]
-inertia = "0.5 kg*m^2"
-friction_torque = "0.5 N*m"
-[motors.drive]
-shaft = "motor"
-kind = "torque_source"
-rotor_inertia = "1e-4 kg*m^2"
-rated_torque = "5 N*m"
+shafts.motor = { friction_torque = "0.02 N*m" }
+shafts.table = { inertia = "0.5 kg*m^2", friction_torque = "0.5 N*m" }
+motors.drive = { shaft = "motor", kind = "torque_source", rotor_inertia = "1e-4 kg*m^2", rated_torque = "5 N*m" }
+simulation = { duration = "1 s", sample_interval = "10 ms" }
 [gears.gear]
 input = "motor"
 output = "table"
@@ -105,9 +97,6 @@ encoder = { ideal = true }
 reference = { kind = "position" }
 position = { gain = "8 1/s" }
 speed = { gain = "0.02 N*m*s/rad", torque_limit = "4 N*m" }
-[simulation]
-duration = "1 s"
-sample_interval = "10 ms"
 """
 
 

@@ -1,7 +1,5 @@
 """Logs as instruments and recorders leave them: headers of many lines, a time for each channel, cut lines, words in place of numbers."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 
@@ -156,23 +154,12 @@ def test_the_first_file_of_a_linear_axis_has_its_slide(tmp_path: Path) -> None:
     (tmp_path / "logs" / "a.csv").write_text("\n".join([head, *rows()]))
     (tmp_path / "rig.toml").write_text(
         """
-        [shafts.motor]
-        [slides.table]
-        mass = "40 kg"
-        friction_force = "20 N"
-        [motors.drive]
-        shaft = "motor"
-        kind = "torque_source"
-        rated_torque = "1 N m"
-        rotor_inertia = 0.0
-        [screws.screw]
-        input = "motor"
-        output = "table"
-        lead = "10 mm"
-        [simulation]
-        duration = "1 s"
-        sample_interval = "1 ms"
-        """
+shafts.motor = {}
+slides.table = { mass = "40 kg", friction_force = "20 N" }
+motors.drive = { shaft = "motor", kind = "torque_source", rated_torque = "1 N m", rotor_inertia = 0.0 }
+screws.screw = { input = "motor", output = "table", lead = "10 mm" }
+simulation = { duration = "1 s", sample_interval = "1 ms" }
+"""
     )
     text = lm.identification.first_task(tmp_path / "logs", rig=tmp_path / "rig.toml")
     assert 'variable = "table_position"' in text

@@ -1,7 +1,5 @@
 """Residuals that are no noise are reported and widen the intervals; minima and interpolations that leave them are not kept."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 
@@ -26,26 +24,16 @@ from lostmotion.identification.virtual_logs import virtual_log
 from lostmotion.reports.identification import write_identification
 
 AXIS = """
-[shafts.rotor]
-viscous_friction = 2e-4
-friction_torque = 5e-3
-[shafts.load]
-inertia = 0.5
-viscous_friction = 2.0
-[motors.drive]
-shaft = "rotor"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 1e-4
+shafts.rotor = { viscous_friction = 2e-4, friction_torque = 5e-3 }
+shafts.load = { inertia = 0.5, viscous_friction = 2.0 }
+motors.drive = { shaft = "rotor", kind = "torque_source", rated_torque = 1.0, rotor_inertia = 1e-4 }
+simulation = { duration = "1 s", sample_interval = "1 ms" }
 [gears.g]
 input = "rotor"
 output = "load"
 ratio = 50
 mesh_damping = 10.0
 stiffness = { kind = "curve", slopes = [2e4], backlash = 2.4e-3 }
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
 """
 TRUTH = {"backlash": 2.4e-3, "inertia": 0.5, "friction": 5e-3}
 NOISE = 2e-4  # rad, of the motor's encoder
@@ -150,18 +138,12 @@ def test_runs_of_one_sign_tell_noise_from_structure(tmp_path: Path, rho: float) 
     assert found.expected == pytest.approx(n / 2, rel=0.01)
 
 
-@pytest.mark.parametrize(
-    ("values", "course"),
-    [
-        (np.sin(5.0 * TIME), "smooth"),
-        (np.repeat(np.sin(5.0 * TIME[::20]), 20), "staircase"),
-        (np.sign(np.sin(5.0 * TIME)), "steps"),
-        (np.random.default_rng(0).normal(size=len(TIME)), "rough"),
-        (np.full(len(TIME), 0.3), "constant"),
-    ],
-)
-def test_courses_of_commands(values: np.ndarray, course: str) -> None:
-    assert course_of(values) == course
+def test_courses_of_commands() -> None:
+    wave = np.sin(5.0 * TIME)
+    courses = {"smooth": wave, "staircase": np.repeat(wave[::20], 20), "steps": np.sign(wave), "constant": np.full(len(TIME), 0.3)}
+    courses["rough"] = np.random.default_rng(0).normal(size=len(TIME))
+    for course, values in courses.items():
+        assert course_of(values) == course
 
 
 def test_a_command_that_repeats_its_values_is_held(tmp_path: Path) -> None:
@@ -178,17 +160,9 @@ def test_a_command_that_repeats_its_values_is_held(tmp_path: Path) -> None:
 # --- what is missing in the model ---
 
 SPINDLE = """
-[shafts.spindle]
-viscous_friction = 0.02
-friction_torque = 0.1
-[motors.drive]
-shaft = "spindle"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = 5e-3
-[simulation]
-duration = "1 s"
-sample_interval = "2 ms"
+shafts.spindle = { viscous_friction = 0.02, friction_torque = 0.1 }
+motors.drive = { shaft = "spindle", kind = "torque_source", rated_torque = 1.0, rotor_inertia = 5e-3 }
+simulation = { duration = "1 s", sample_interval = "2 ms" }
 """
 SPINDLE_NOISE = 1e-3  # rad
 
@@ -202,11 +176,8 @@ def spindle_result(directory: Path, drag: float, **more: Any) -> IdentificationR
             "logs": {"files": ["*.csv"]},
             "inputs": {"drive_command": {"channel": "torque", "interpolation": "hold"}},
             "measured": {"angle": {"channel": "angle", "variable": "spindle_angle", "deviation": SPINDLE_NOISE}},
-            "set": {
-                "motors.drive.rotor_inertia": "inertia",
-                "shafts.spindle.viscous_friction": "viscous",
-                "shafts.spindle.friction_torque": "coulomb",
-            },
+            "set": {"motors.drive.rotor_inertia": "inertia"}
+            | {"shafts.spindle.viscous_friction": "viscous", "shafts.spindle.friction_torque": "coulomb"},
             "parameters": {
                 "inertia": {"start": 6e-3, "min": 1e-4, "max": 1.0},
                 "viscous": {"start": 0.03, "max": 1.0, "off": 0.0},

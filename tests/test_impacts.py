@@ -348,20 +348,11 @@ def test_step_by_step_it_is_the_same() -> None:
 
 
 @pytest.mark.parametrize(
-    ("stiffness", "said"),
-    [
-        ({"kind": "rigid", "backlash": 0.02}, "give their restitution, 0 to 1, or a stiffness"),
-        ({"kind": "rigid", "restitution": 0.5}, "has a restitution but no backlash"),
-        ({"kind": "rigid", "backlash": 0.02, "restitution": 1.5}, "restitution: 1.5"),
-    ],
-)
-def test_what_is_no_law_of_flanks_is_refused(stiffness: dict[str, Any], said: str) -> None:
-    refused(lambda: pair(0.5).replace(**{"gears.mesh.stiffness": stiffness}), match=said)
-
-
-@pytest.mark.parametrize(
     ("changes", "said"),
     [
+        ({"gears.mesh.stiffness": {"kind": "rigid", "backlash": 0.02}}, "give their restitution, 0 to 1, or a stiffness"),
+        ({"gears.mesh.stiffness": {"kind": "rigid", "restitution": 0.5}}, "has a restitution but no backlash"),
+        ({"gears.mesh.stiffness": {"kind": "rigid", "backlash": 0.02, "restitution": 1.5}}, "restitution: 1.5"),
         ({"gears.mesh.losses": {"kind": "constant_efficiency", "efficiency": 0.9}}, "mesh: is rigid and has losses"),
         ({"shafts.a": {"inertia": 1.0, "speed": {"mean": 1.0}}}, "the motion of shaft 'a' is given; give the gear"),
         ({"freewheels": {"f": {"input": "a", "output": "b"}}}, "rigid flanks beside the freewheel 'f'"),
@@ -369,7 +360,7 @@ def test_what_is_no_law_of_flanks_is_refused(stiffness: dict[str, Any], said: st
         ({"gears.mesh.mesh_damping": 1.0}, "has mesh damping but is rigid"),
     ],
 )
-def test_what_impacts_do_not_cover_is_refused(changes: dict[str, Any], said: str) -> None:
+def test_what_is_no_law_of_flanks_or_impacts_do_not_cover_is_refused(changes: dict[str, Any], said: str) -> None:
     refused(lambda: pair(0.5).replace(**changes), match=said)
 
 

@@ -1,7 +1,5 @@
 """Monitoring: changes of a drive found from its operation logs, and the false-alarm rate that is stated."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from pathlib import Path
@@ -19,16 +17,10 @@ from lostmotion.identification.monitor.monitor import LogEstimate, _in_units_of_
 from refusals import refused
 
 JOINT = """
-[shafts.motor]
-friction_torque = "8 mN*m"
-[shafts.arm]
-inertia = "0.25 kg*m^2"
-friction_torque = "0.8 N*m"
-[motors.drive]
-shaft = "motor"
-kind = "torque_source"
-rated_torque = 1.0
-rotor_inertia = "0.8 kg*cm^2"
+shafts.motor = { friction_torque = "8 mN*m" }
+shafts.arm = { inertia = "0.25 kg*m^2", friction_torque = "0.8 N*m" }
+motors.drive = { shaft = "motor", kind = "torque_source", rated_torque = 1.0, rotor_inertia = "0.8 kg*cm^2" }
+simulation = { duration = "1 s", sample_interval = "1 ms" }
 [gears.mesh]
 input = "motor"
 output = "arm"
@@ -36,9 +28,6 @@ ratio = 80
 stiffness = { kind = "curve", backlash = "0.6 mrad", slopes = ["9000 N*m/rad"] }
 mesh_damping = "20 N*m*s/rad"
 losses = { kind = "constant_efficiency", efficiency = 0.9 }
-[simulation]
-duration = "1 s"
-sample_interval = "1 ms"
 """
 STEP = 2.0 * np.pi / 2**17  # of the motor's encoder
 NOISE = 1e-4  # rad

@@ -26,21 +26,12 @@ NETWORK = np.array([[-1 / (R_WC * C_W), 1 / (R_WC * C_W)], [1 / (R_WC * C_C), -(
 
 
 def run(command, duration: float = 60.0, interval: float = 0.05, **limits) -> lm.Scenario:
+    limits = {"resistance": 0.3, "torque_constant": 0.06, **THERMAL, **limits}
+    rigid = {"stiffness": {"kind": "rigid"}, "losses": {"kind": "constant_efficiency", "efficiency": 1.0}}
     return lm.Scenario(
         command=command,
-        motor={
-            "kind": "torque_source",
-            "rotor_inertia": 1e-4,
-            "rated_torque": 1.0,
-            "limits": {"resistance": 0.3, "torque_constant": 0.06, **THERMAL, **limits},
-        },
-        gearbox={
-            "ratio": 50.0,
-            "rated_input_speed": 300.0,
-            "rated_output_torque": 20.0,
-            "stiffness": {"kind": "rigid"},
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        motor={"kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0, "limits": limits},
+        gearbox={"ratio": 50.0, "rated_input_speed": 300.0, "rated_output_torque": 20.0, **rigid},
         load={"inertia": 5.0, "viscous_friction": 10.0},
         task={"ambient_temperature": "40 degC"},
         simulation={"duration": duration, "sample_interval": interval},

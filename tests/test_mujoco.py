@@ -252,17 +252,12 @@ def test_data_that_was_changed_is_noticed() -> None:
             arm.step(wrong)
 
 
-def test_a_gearbox_of_the_catalogue_is_attached_by_its_name() -> None:
+def test_a_gearbox_and_an_actuator_of_the_catalogue_are_attached_by_their_names() -> None:
     arm = lm.mujoco.attach(arm_model(1e-3), {"elbow": "schaeffler-rt1-h-20-100"})
     arm.step({"elbow": 0.2})
     assert arm["motor_torque"].tolist() == [0.2]
-
-
-def test_an_actuator_of_the_catalogue_is_attached_by_its_name() -> None:
-    leg = lm.mujoco.attach(arm_model(1e-3), {"elbow": "t-motor-ak80-6"})
-    motor, box = lm.actuator("t-motor-ak80-6")
-    assert leg.drives["elbow"].motor == motor
-    assert leg.drives["elbow"].gearbox == box
+    drive = lm.mujoco.attach(arm_model(1e-3), {"elbow": "t-motor-ak80-6"}).drives["elbow"]
+    assert (drive.motor, drive.gearbox) == lm.actuator("t-motor-ak80-6")
     assert lm.actuator("t-motor-ak80-6", rotor_inertia=1e-4)[0].rotor_inertia == 1e-4
     with refuses(match=r"actuator from .*: the record lacks rotor_inertia"):
         lm.mujoco.attach(arm_model(1e-3), {"elbow": "unitree-n5020-16-g1-arm"})
@@ -332,25 +327,19 @@ def test_a_screw_axis_is_described_by_mass_and_forces_at_its_slide() -> None:
         lm.mujoco.reduce(lm.Scenario(**SCREW), "10 deg", 1.0)
 
 
-def test_the_load_torque_of_a_scenario_is_not_dropped_from_a_reduction() -> None:
+def test_what_a_reduction_costs_is_stated_and_no_load_torque_of_a_scenario_is_dropped_from_it() -> None:
     joint = lm.load("catalogue-robot-joint")
-    refused(lambda: lm.mujoco.reduce(joint.replace(**{"load.torque": 10.0}), 0.5, 1.0), "load.torque")
-    given = lm.mujoco.reduce(joint.replace(**{"load.torque": 10.0}), 0.5, 1.0, load_torque=0.0)
-    assert given == lm.mujoco.reduce(joint, 0.5, 1.0)
-
-
-def test_a_joint_that_its_friction_locks_is_not_reduced() -> None:
-    """The motion ends near where it begins, so that the end alone does not show that the joint stood still."""
-    refused(
-        lambda: lm.mujoco.reduce(lm.load("catalogue-robot-joint").replace(**{"load.friction_torque": 1e5}), 0.5, 1.0),
-        match="does not follow the motion",
-    )
-
-
-def test_what_a_reduction_costs_is_stated() -> None:
-    found = lm.mujoco.reduce(lm.load("catalogue-robot-joint"), 0.5, 1.0, 10.0)
+    found = lm.mujoco.reduce(joint, 0.5, 1.0, 10.0)
     assert found.gear < 100.0  # the losses that depend on the load
     assert 1e-3 < found.error < 0.2
+    loaded = joint.replace(**{"load.torque": 10.0})
+    refused(lambda: lm.mujoco.reduce(loaded, 0.5, 1.0), "load.torque")
+    assert lm.mujoco.reduce(loaded, 0.5, 1.0, load_torque=0.0) == lm.mujoco.reduce(joint, 0.5, 1.0)
+    # The motion ends near where it begins, so that the end alone does not show that the joint stood still.
+    locked = joint.replace(**{"load.friction_torque": 1e5})
+    refused(lambda: lm.mujoco.reduce(locked, 0.5, 1.0), match="does not follow the motion")
+    for ratio, words in ({}, "has no actuator that says the gear; give"), ({"ratio": 100.0}, "has no armature"):
+        refused(lambda given=ratio: lm.mujoco.from_mjcf(arm_model(1e-3), "elbow", **given), match=f"joint 'elbow': {words}")
 
 
 TURNING = (
@@ -386,11 +375,6 @@ def test_the_drive_of_an_mjcf_joint_moves_as_that_joint() -> None:
         arm.step([0.01])
     assert abs(data.qpos[0]) > 0.1
     assert arm.data.qpos[0] == pytest.approx(data.qpos[0], abs=1e-5)
-
-
-def test_a_joint_that_describes_no_drive_is_refused() -> None:
-    assert "joint 'elbow': has no actuator that says the gear; give" in refused(lambda: lm.mujoco.from_mjcf(arm_model(1e-3), "elbow"))
-    assert "joint 'elbow': has no armature" in refused(lambda: lm.mujoco.from_mjcf(arm_model(1e-3), "elbow", ratio=100.0))
 
 
 SCREW = {

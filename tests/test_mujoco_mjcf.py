@@ -1,6 +1,7 @@
 """Drives of the joints that an MJCF model describes: against MuJoCo itself; what is not taken over is refused by name."""
 
 import math
+import re
 from collections.abc import Callable
 from typing import Any
 
@@ -132,44 +133,21 @@ def test_a_limit_of_one_side_is_taken_over_for_a_motor_and_refused_for_a_servo(l
         assert exactly(made, control) == pytest.approx(moved(made, control), abs=ACCURACY)
         made = spec("position", limited("ctrl", low, high))
         assert exactly(made, control) == pytest.approx(moved(made, control), abs=ACCURACY)
-    with pytest.raises(lm.InputError, match="must be symmetric") as caught:
-        lm.mujoco.from_mjcf(spec("position", limited("force", low, high)), "arm")
-    assert "forcerange" in caught.value.problems[0].keys
+    made = spec("position", limited("force", low, high))
+    refused(lambda: lm.mujoco.from_mjcf(made, "arm"), "forcerange", "actuatorfrcrange", match="must be symmetric")
 
 
 # A value of each attribute that no motor and no servo has unless it is given.
 T = mujoco.mjtLimited.mjLIMITED_TRUE
-OTHERS: dict[str, Any] = {
-    "actdim": 1,
-    "actearly": True,
-    "actlimited": T,
-    "actrange": [-0.1, 0.1],
-    "armature": 0.05,
-    "biasprm": [0.4, -30.0, -1.5, *[0.0] * 7],
-    "biastype": mujoco.mjtBias.mjBIAS_NONE,
-    "cranklength": 0.2,
-    "ctrllimited": T,
-    "ctrlrange": [-0.2, 0.2],
-    "ctrlspec": 1,
-    "damping": [0.3, 0.2, 0.1],
-    "delay": 2e-3,
-    "dynprm": [0.3, *[0.0] * 9],
-    "dyntype": mujoco.mjtDyn.mjDYN_FILTEREXACT,
-    "ffrange": [-1.0, 1.0],
-    "forcelimited": T,
-    "forcerange": [-0.5, 0.5],
-    "gainprm": [20.0, *[0.0] * 9],
-    "gaintype": mujoco.mjtGain.mjGAIN_AFFINE,
-    "gear": [2.0, *[0.0] * 5],
-    "group": 2,
-    "inheritrange": 0.5,
-    "interp": 1,
-    "lengthrange": [-0.1, 0.1],
-    "nsample": 4,
-    "trntype": mujoco.mjtTrn.mjTRN_JOINTINPARENT,
-    "userdata": [3.0],
-    "velrange": [-0.1, 0.1],
-}
+OTHERS: dict[str, Any] = (
+    {"actdim": 1, "actearly": True, "actlimited": T, "actrange": [-0.1, 0.1], "armature": 0.05, "cranklength": 0.2}
+    | {"ctrllimited": T, "ctrlrange": [-0.2, 0.2], "ctrlspec": 1, "damping": [0.3, 0.2, 0.1], "delay": 2e-3}
+    | {"ffrange": [-1.0, 1.0], "forcelimited": T, "forcerange": [-0.5, 0.5], "gear": [2.0, *[0.0] * 5], "group": 2}
+    | {"inheritrange": 0.5, "interp": 1, "lengthrange": [-0.1, 0.1], "nsample": 4, "userdata": [3.0], "velrange": [-0.1, 0.1]}
+    | {"biasprm": [0.4, -30.0, -1.5, *[0.0] * 7], "dynprm": [0.3, *[0.0] * 9], "gainprm": [20.0, *[0.0] * 9]}
+    | {"biastype": mujoco.mjtBias.mjBIAS_NONE, "dyntype": mujoco.mjtDyn.mjDYN_FILTEREXACT}
+    | {"gaintype": mujoco.mjtGain.mjGAIN_AFFINE, "trntype": mujoco.mjtTrn.mjTRN_JOINTINPARENT}
+)
 # Attributes of an actuator that say which one it is, or are objects of the compiler.
 NAMES = {"classname", "compiler", "id", "info", "name", "plugin", "refsite", "signature", "slidersite", "target", "type"}
 
@@ -225,25 +203,18 @@ def test_what_is_not_taken_over_is_refused_by_name(key: str) -> None:
     refused(lambda: lm.mujoco.from_mjcf(made, "arm"), key)
 
 
-def test_a_dc_motor_of_mujoco_is_refused_by_name() -> None:
-    motor = '<actuator><dcmotor name="a" joint="arm" motorconst="0.05 0.05" resistance="2"/></actuator>'
-    made = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{JOINT}</worldbody>{motor}</mujoco>")
-    with pytest.raises(lm.InputError, match="is not taken over") as caught:
-        lm.mujoco.from_mjcf(made, "arm")
-    assert caught.value.problems[0].keys[0] in ("gaintype", "biastype", "dyntype")
-
-
-def test_an_actuator_on_a_tendon_of_the_joint_is_refused_by_name() -> None:
-    tendon = '<tendon><fixed name="rope"><joint joint="arm" coef="9"/></fixed></tendon>'
-    motor = '<actuator><motor name="a" tendon="rope"/></actuator>'
-    made = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{JOINT}</worldbody>{tendon}{motor}</mujoco>")
-    refused(lambda: lm.mujoco.from_mjcf(made, "arm"), "trntype")
-
-
-def test_a_second_actuator_and_a_disabled_one_are_refused() -> None:
+def test_other_actuators_are_refused_by_name() -> None:
+    """A motor of direct current, one on a tendon, a second one, a disabled one."""
+    dc = '<actuator><dcmotor name="a" joint="arm" motorconst="0.05 0.05" resistance="2"/></actuator>'
+    rope = '<tendon><fixed name="rope"><joint joint="arm" coef="9"/></fixed></tendon><actuator><motor name="a" tendon="rope"/></actuator>'
+    for text, key in ((dc, "(gain|bias|dyn)type"), (rope, "trntype")):
+        made = mujoco.MjSpec.from_string(f"<mujoco><worldbody>{JOINT}</worldbody>{text}</mujoco>")
+        with pytest.raises(lm.InputError) as caught:
+            lm.mujoco.from_mjcf(made, "arm")
+        assert re.fullmatch(key, caught.value.problems[0].keys[0])
     made = spec("motor")
     made.add_actuator(name="other", target="arm", trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    assert "has the actuator 'servo' and the actuator 'other'; leave one of them" in refused(lambda: lm.mujoco.from_mjcf(made, "arm"))
+    refused(lambda: lm.mujoco.from_mjcf(made, "arm"), match="has the actuator 'servo' and the actuator 'other'; leave one of them")
     model = spec("motor").compile()
     model.opt.disableactuator = 1
     refused(lambda: lm.mujoco.from_mjcf(model, "arm"), "disableactuator")

@@ -4,12 +4,18 @@ import math
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.references import PositionReference
+from lostmotion.simulation.runs.core_runs import core_case
+from lostmotion.simulation.runs.run import run
 from lostmotion.sizing.axis_task.axis_task import reference_of
+from lostmotion.sizing.axis_task.candidate_scenario import begins_alike, cycles_of
+from lostmotion.sizing.axis_task.cycle_demands import change
+from lostmotion.studies.runs.axis_cycles import VARIABLES, until_it_repeats
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.runs.read_table import read_table
 from lostmotion.studies.runs.run_study import study
@@ -19,7 +25,8 @@ from lostmotion.studies.selection.task_file import load_task, task_of
 from lostmotion.studies.study.drive_check_columns import UNSTABLE
 from lostmotion.studies.study.records_that_vary import names_that_fit
 from lostmotion.studies.study.study import Study
-from test_axis_tasks import ARM, GEARBOX, MOTOR
+from test_axis_tasks import ARM, GEARBOX, MOTOR, SLIDE
+from test_select import TABLES
 from test_task_keys import FORMS
 
 EXCESS = 0.44
@@ -52,6 +59,8 @@ def test_a_torque_of_inertia_falls_with_the_square_of_the_time(task: Study):
     factor = least_factor(task, task.parameters(0, 1)[0])
     # Found to 0.3 %, and rounded up to hundredths.
     assert math.sqrt(1.0 + EXCESS) <= factor <= 1.0031 * math.sqrt(1.0 + EXCESS) + 0.01
+    heavy = task_of({**INERTIAL, "task": {**INERTIAL["task"], "gravity": {"mass": 20.0, "radius": 0.5}}})
+    assert least_factor(heavy, heavy.parameters(0, 1)[0]) is None  # a weight is not carried by going slower
 
 
 def test_a_slower_cycle_has_the_same_path(task: Study):
@@ -76,7 +85,9 @@ def test_sines_samples_payloads_and_processes_are_stretched():
 
 
 def test_the_nearest_miss_says_what_it_lacks_and_when_it_fits(task: Study, ranked: Any):
-    (miss,) = misses(task, ranked, 3)
+    (miss,), (price,) = misses(task, ranked, 3), prices(ranked, task.select)
+    assert (price.limit, price.excludes, price.alone) == ("current", 1, 1)
+    assert price.opens == pytest.approx(EXCESS, rel=1e-6)
     assert miss.lacks == pytest.approx({"current": EXCESS}, rel=1e-6)
     assert miss.slower == pytest.approx(1.2, abs=0.015)
     longest = max(b - a for a, b in reference_of(task.scenario).intervals())
@@ -85,17 +96,6 @@ def test_the_nearest_miss_says_what_it_lacks_and_when_it_fits(task: Study, ranke
     row = task.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     assert Axes(slowed(task, miss.slower)).refused(row) is None
     assert Axes(slowed(task, 0.98 * miss.slower)).refused(row)["violated"] == "current"
-
-
-def test_what_a_limit_would_have_to_give(task: Study, ranked: Any):
-    (price,) = prices(ranked, task.select)
-    assert (price.limit, price.excludes, price.alone) == ("current", 1, 1)
-    assert price.opens == pytest.approx(EXCESS, rel=1e-6)
-
-
-def test_a_weight_is_not_carried_by_going_slower():
-    heavy = {**INERTIAL, "task": {**INERTIAL["task"], "gravity": {"mass": 20.0, "radius": 0.5}}}
-    assert least_factor(task_of(heavy), task_of(heavy).parameters(0, 1)[0]) is None
 
 
 def test_records_without_data_are_listed_apart(tmp_path: Path):
@@ -108,9 +108,7 @@ def test_records_without_data_are_listed_apart(tmp_path: Path):
     assert lacking in group.candidates[0]
     assert "lacks" in group.datum
     assert all(lacking not in miss.candidate.name for miss in misses(what, ranked, 5))
-
-
-def test_illustrative_records_are_no_candidates_unless_asked_for():
+    # Illustrative records are no candidates unless they are asked for.
     assert "paper-gearbox" not in names_that_fit("gearbox", {"ratio": [85.0, 95.0]})
     assert names_that_fit("gearbox", {"name": "paper-*"}) == ["paper-gearbox"]
 
@@ -161,3 +159,74 @@ def test_a_candidate_whose_run_violates_a_limit_is_run_in_slower_cycles(tmp_path
     row = tight.parameters(miss.candidate.run, miss.candidate.run + 1)[0]
     columns, _ = Axes(slowed(tight, miss.slower)).measured(row)
     assert columns["tracking_error_peak"] <= 0.95 * error
+
+
+# --- A longer run of a repeated goes on where the shorter one ends ---
+
+
+STEPS = TABLES["controller"]["reference"] | {"moves": [{"to": 1.2}]}  # it goes on from where it ends
+WITHOUT_REST = TABLES["controller"]["reference"] | {"acceleration": 8.0, "moves": [{"to": 0.5}, {"to": 0.0}]}
+JUMPS = {"samples": {"times": [0.0, 0.3, 0.300001, 0.999], "values": [2.0, 2.0, -1.0, -1.0]}}  # also where the cycle ends
+SAMPLES = {"times": [0.0, 0.25, 0.5, 0.75, 1.0], "values": [0.0, 0.3, 0.6, 0.3, 0.0]}
+
+WINDOWLESS = {"settling_window": None}  # there are no moves
+
+
+def repeated(base: dict[str, Any] = TABLES, **changes: Any) -> dict[str, Any]:
+    return {**base, **{key: base[key] | value for key, value in changes.items()}}
+
+
+TASKS = {
+    "moves there and back": repeated(),
+    "moves one way": repeated(controller={"reference": STEPS}),
+    "no rest": repeated(controller={"reference": WITHOUT_REST}),
+    "a load that jumps": repeated(load={"torque": JUMPS}),
+    "an ideal current loop": repeated(controller={"current": {"kind": "ideal"}}),
+    "gravity and a payload": repeated(ARM, task={"payload": [{"begin": 0.0, "end": 1.5, "mass": 1.0, "radius": 0.4}]}),
+    "a slide": SLIDE,
+    "samples": repeated(task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES}}),
+    "a spline": repeated(task=WINDOWLESS, controller={"reference": {"kind": "position", "samples": SAMPLES | {"interpolation": "cubic"}}}),
+}
+
+
+@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("least", [0.0, 1.0])
+def test_a_run_that_goes_on_is_a_run_of_its_own(name: str, least: float, monkeypatch: pytest.MonkeyPatch):
+    """`least`: the relative difference of two cycles that ends a run, so that all stop after two cycles, or none."""
+    study = task_of(TASKS[name])
+    row = study.parameters(study.total - 1, study.total)[0]
+    monkeypatch.setattr("lostmotion.studies.runs.axis_cycles.REPEATS", least)
+    found = until_it_repeats(study, row)
+    count = found.cycles.count
+    assert count == (2 if least else 4)
+    alone = run(study.axis_at(row, count), energy=False)
+    assert np.array_equal(found.result.time, alone.time)
+    for variable in VARIABLES:
+        assert np.array_equal(found.result[variable], alone[variable]), variable
+    assert found.result.attrs["switching_count"] == alone.attrs["switching_count"]
+    assert found.change == change(alone, count)
+
+
+def test_a_spline_through_more_cycles_is_another_one():
+    for name, alike in (("samples", True), ("a spline", False)):
+        study = task_of(TASKS[name])
+        two, four = (cycles_of(study.scenario, study.axis, count) for count in (2, 4))
+        assert begins_alike(two, four) == alike
+
+
+def test_an_error_at_the_pause_ends_the_run():
+    study = task_of(TABLES)
+    row = study.parameters(0, 1)[0]
+    scenario = study.axis_at(row, 4)
+
+    def fails() -> bool:
+        raise KeyError("at the pause")
+
+    out = np.empty((1, scenario.simulation.samples))
+    table = scenario.simulation
+    times = {"duration": table.duration, "sample_interval": table.sample_interval}
+    rest = {**times, "control": scenario.control(), "pause": 100, "enough": fails}
+    with pytest.raises(KeyError, match="at the pause"):
+        lm._core.run_into(core_case(scenario), out, channels=[0], **rest)
+    with pytest.raises(ValueError, match="room"):
+        lm._core.run_into(core_case(scenario), out, channels=[0, 1], **rest)

@@ -1,9 +1,11 @@
 """Reports: the numbers of a page are those of the results; what it shows without its script; pictures on request."""
 
+import itertools
 import re
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,6 +15,7 @@ import lostmotion as lm
 from conftest import ROOT
 from html_pages import Page, charts
 from lostmotion.cli import app
+from lostmotion.reports import looks, panels, plots
 from lostmotion.reports import page as pages
 from lostmotion.reports.contours import contours
 from lostmotion.reports.looks import LOOKS, STYLES, look
@@ -69,12 +72,8 @@ def test_the_numbers_of_a_page_are_those_of_the_result(axis: lm.servo.ServoRepor
         margin = next(m for m in phase["marks"] if m["x"] == row.margins.crossover)
         assert np.radians(margin["y"] - margin["to"]) == pytest.approx(row.margins.phase_margin, rel=1e-12)
         assert margin["to"] == pytest.approx(-180.0, abs=2.0)  # the curve is linear between its frequencies there
-
-
-def test_a_notebook_shows_the_page_of_the_command(axis: lm.servo.ServoReport) -> None:
     shown = axis._repr_html_()  # type: ignore[attr-defined]
-    assert shown.startswith("<iframe srcdoc=")
-    assert "table in " in shown and "Worst margins" in shown
+    assert shown.startswith("<iframe srcdoc=") and "table in " in shown and "Worst margins" in shown
 
 
 def test_a_page_is_well_formed_and_asks_for_nothing() -> None:
@@ -114,12 +113,9 @@ def test_all_colours_of_figures_are_those_of_the_style_sheet() -> None:
     assert not found
     drawn = [m.name for m in modules if re.search(r"(?<!\w)Figure\(figsize", m.read_text())]
     assert not drawn, "plots.Picture has the looks"
-
-
-def test_curves_differ_in_grey() -> None:
-    """Two curves with the same line style would need luminances that are far apart; no two of a panel have the same."""
-    assert len({str(style["linestyle"]) for style in LOOKS}) == len(LOOKS)
-    assert len({str(style["linestyle"]) for style in STYLES.values()}) == len(STYLES)
+    # In grey two curves with the same line style would need luminances that are far apart; no two of a panel have the same.
+    for styles in (LOOKS, STYLES.values()):
+        assert len({str(style["linestyle"]) for style in styles}) == len(styles)
 
 
 def test_contours_lie_where_the_quantity_has_their_value() -> None:
@@ -215,6 +211,10 @@ def test_a_run_is_reported_with_the_numbers_of_its_dataset(tmp_path: Path) -> No
     assert practical(float(np.abs(wanted).max()), "rad", 4) in page
     assert not Page(page).faults
     assert result.lm._repr_html_().startswith("<iframe")
+    run, small = CliRunner().invoke, ["run", "paper-2dof-nl-small", "--report"]
+    assert run(app, [*small, str(tmp_path / "r.html")]).exit_code == 0
+    assert "Share of the time in which contacts are stuck: input" in (tmp_path / "r.html").read_text()
+    assert "its name must end in .html" in str(run(app, [*small, str(tmp_path / "r.pdf")]).exception)
 
 
 def test_the_figure_of_a_run_shows_its_axis_and_its_contacts_as_bars() -> None:
@@ -222,15 +222,6 @@ def test_the_figure_of_a_run_shows_its_axis_and_its_contacts_as_bars() -> None:
     axes = {a.get_title(): a for a in figure.axes}
     assert {"Position of traverse drive", "Measured following error of elevation drive"} <= axes.keys()
     assert [t.get_text() for t in axes["Contacts"].get_yticklabels()][:2] == ["traverse motor", "traverse gear twist"]
-
-
-def test_a_report_of_a_run_is_a_page(tmp_path: Path) -> None:
-    path = tmp_path / "r.html"
-    done = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(path)])
-    assert done.exit_code == 0, done.output
-    assert "Share of the time in which contacts are stuck: input" in path.read_text()
-    wrong = CliRunner().invoke(app, ["run", "paper-2dof-nl-small", "--report", str(tmp_path / "r.pdf")])
-    assert "its name must end in .html" in str(wrong.exception)
 
 
 def test_a_page_of_250_logs_stays_below_two_megabytes() -> None:
@@ -245,3 +236,56 @@ def test_a_page_of_250_logs_stays_below_two_megabytes() -> None:
     page = render(report(*panels))
     assert len(page) < 2e6
     assert len(charts(page)) == 250
+
+
+# --- pictures by matplotlib ---
+
+
+def drawn(*charts: panels.Chart, columns: int = 2) -> Any:
+    """A picture that has its layout."""
+    figure = plots.draw(charts, columns, (9.0, 3.5))
+    figure.canvas.draw()
+    return figure
+
+
+def test_legends_of_pictures_cover_no_curves() -> None:
+    x = np.linspace(0.0, 1.0, 5)
+    names = ("motor speed / ratio", "load speed", "reference")
+    curves = tuple(panels.Curve(name, x, k * x, looks.look(k)) for k, name in enumerate(names))
+    contacts = panels.Contacts("contacts", x, {"motor": np.array([0, 1, 1, -1, 0])})
+    figure = drawn(panels.Panel("speed", "time [s]", "speed [rad/s]", curves), contacts)
+    for axes, labels in zip(figure.axes, (list(names), ["stuck", "slips (up forward, down reverse)"]), strict=True):
+        legend, box = axes.get_legend().get_window_extent(), axes.get_window_extent()
+        assert legend.y0 >= box.y1 and legend.x1 <= box.x1 + 0.1 * figure.dpi
+        assert axes.title.get_window_extent().y0 >= legend.y1
+        assert [text.get_text() for text in axes.get_legend().get_texts()] == labels
+
+
+def test_texts_of_marks_do_not_cover_each_other() -> None:
+    x = np.geomspace(1.0, 100.0, 9)
+    marks = [panels.Mark(10.0 + 0.1 * k, 0.1 - 1e-3 * k, f"{60 + k}.5°", looks.look(k)) for k in range(3)]
+    marks.append(panels.Mark(10.0, 0.1, "60.5°", looks.look(3)))  # which is written already
+    curve = panels.Curve("falling", x, 1.0 / x, looks.look(0))
+    panel = panels.Panel("gain", "frequency [Hz]", "gain [-]", (curve,), log_x=True, log_y=True, marks=tuple(marks))
+    (axes,) = drawn(panel, columns=1).axes
+    boxes = [text.get_window_extent() for text in axes.texts]
+    assert [text.get_text() for text in axes.texts] == ["60.5°", "61.5°", "62.5°"]
+    assert not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
+
+
+def test_an_axis_with_hundreds_of_names_shows_a_few() -> None:
+    names = tuple(f"gearbox-{k}" for k in range(227))
+    dots = panels.Curve("energy", np.arange(227.0), np.arange(227.0), looks.DOTS)
+    (axes,) = drawn(panels.Panel("energy", "gearbox", "energy [J]", (dots,), x_names=names), columns=1).axes
+    shown = [text.get_text() for text in axes.get_xticklabels()]
+    assert shown == list(names[::10])
+
+
+def test_the_numbers_of_a_matrix_fit_into_its_cells() -> None:
+    names = tuple(f"parameter_{k}" for k in range(7))
+    group = panels.Group("matrix", "", "", (panels.Matrix("correlation", names, np.full((7, 7), -0.5)),))
+    figure = plots.draw_group(group)
+    figure.canvas.draw()
+    axes = figure.axes[0]
+    cell = axes.get_window_extent().width / 7
+    assert all(text.get_window_extent().width < cell for text in axes.texts)

@@ -230,19 +230,15 @@ def test_end_state_continues_a_run(small: Path) -> None:
     assert float(rest["load_speed"][-1]) == pytest.approx(float(whole["load_speed"][-1]), rel=1e-6)
 
 
-@pytest.mark.parametrize("interval", [math.inf, 1e300, 1e-300, 0.0, -1e-3, math.nan])
-def test_intervals_that_no_motion_can_have_are_refused(interval):
+def test_intervals_that_no_motion_can_have_are_refused():
     drive = lm.load("paper-2dof-nl-small").drive()
-    refused(lambda: lm.Simulation(drive, step=interval), match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number")
     simulation = lm.Simulation(drive)
-    refused(lambda: simulation.advance(interval, command=0.1), match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number")
+    for interval in (math.inf, 1e300, 1e-300, 0.0, -1e-3, math.nan):
+        for call in (lambda h=interval: lm.Simulation(drive, step=h), lambda h=interval: simulation.advance(h, command=0.1)):
+            refused(call, match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number")
     assert simulation.time == 0.0
-
-
-def test_an_interval_below_the_resolution_of_the_time_is_refused():
-    simulation = lm.Simulation(lm.load("paper-2dof-nl-small").drive())
     simulation.advance(1e6, command=0.0)
-    assert "below the resolution of the time" in refused(lambda: simulation.advance(1e-12, command=0.1))
+    refused(lambda: simulation.advance(1e-12, command=0.1), match="below the resolution of the time")
 
 
 def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):

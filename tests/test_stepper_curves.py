@@ -1,6 +1,7 @@
 """Torques of steppers over the step rate: closed forms, an own integration, all forms of scenarios, the command line."""
 
 import csv
+import itertools
 import math
 from pathlib import Path
 
@@ -154,3 +155,169 @@ def test_the_command_prints_the_curves_and_writes_them(tmp_path: Path) -> None:
 )
 def test_curves_that_make_no_sense_are_refused(scenario: str, rates, text: str) -> None:
     refused(lambda: lm.sizing.stepper_curves(lm.load(ROOT / "scenarios" / f"{scenario}.toml"), rates), match=text)
+
+
+# --- steppers with a winding ---
+
+
+NEMA_17 = {
+    "kind": "stepper",
+    "steps_per_revolution": 200,
+    "holding_torque": 0.44,
+    "rotor_inertia": 54e-7,
+    "rated_current": 1.7,
+    "resistance_phase": 1.5,
+    "inductance_phase": 2.8e-3,
+    "supply_voltage": 24.0,
+}
+REGULATION = 1e5  # [1/s], as docs/steppers.md states it
+DURATION = 0.02
+
+
+def random_case(seed: int) -> lm.Scenario:
+    """A rotor with a load torque, whose field starts at once in microsteps; many run into the supply."""
+    draw = np.random.default_rng(seed)
+    T_H = float(10.0 ** draw.uniform(-1.0, 0.5))
+    steps = int(draw.choice([200, 400]))
+    J = 1.2e-5 * T_H * float(draw.uniform(0.5, 4.0))
+    motor = {
+        "shaft": "motor",
+        "kind": "stepper",
+        "steps_per_revolution": steps,
+        "holding_torque": T_H,
+        "detent_torque": T_H * float(draw.choice([0.0, 0.04])),
+        "rotor_inertia": J,
+        "rated_current": float(draw.uniform(0.5, 4.0)),
+        "resistance_phase": float(draw.uniform(0.3, 5.0)),
+        "inductance_phase": float(draw.uniform(0.5e-3, 8e-3)),
+        "supply_voltage": float(draw.uniform(12.0, 60.0)),
+        "standstill_current": float(draw.choice([1.0, 0.5])),
+    }
+    speed = float(draw.uniform(2.0, 20.0))
+    stepping = {
+        "reference": {"ramps": [{"duration": 0.7 * DURATION, "rise": 0.7 * speed * DURATION}]},
+        "microsteps": int(draw.choice([1, 2, 4, 16])),
+        "standstill_delay": 1e-3,
+    }
+    viscous = math.sqrt(0.25 * steps * T_H * J) * float(draw.uniform(0.02, 0.5))
+    return lm.Scenario(
+        shafts={"motor": {"inertia": 0.0, "viscous_friction": viscous, "torque": T_H * float(draw.uniform(0.0, 0.3))}},
+        motors={"m": motor},
+        command={"m": {"stepping": stepping}},
+        simulation={"duration": DURATION, "sample_interval": 1e-4},
+    )
+
+
+def integrated(scenario: lm.Scenario) -> np.ndarray:
+    """Both currents, angle and speed at the samples, by DOP853 to 1e-12 from one change of an input to the next."""
+    motor, shaft = scenario.motors["m"], scenario.shafts["motor"]
+    N, T_H, T_D, J = 0.25 * motor.steps_per_revolution, motor.holding_torque, motor.detent_torque, motor.rotor_inertia
+    R, L, U, size = (motor.resistance_phase, motor.inductance_phase, motor.supply_voltage, math.sqrt(2.0) * motor.rated_current)
+    K, b, T = T_H / size, shaft.viscous_friction, shaft.torque.mean
+    signals = scenario.signals()
+    field = signals["m_command"].breakpoint_list()
+    level = signals["m_current_command"].breakpoint_list() if "m_current_command" in signals else [(0.0, 1.0, 0.0)]
+    times = scenario.simulation.sample_interval * np.arange(round(DURATION / scenario.simulation.sample_interval) + 1)
+
+    def held(points: list, t: float) -> float:
+        return [value for begin, value, _ in points if begin <= t][-1]
+
+    def rates(want: tuple[float, float]):
+        def rate(_: float, x: np.ndarray) -> list[float]:
+            a, c, phi, w = x
+            sin, cos = math.sin(N * phi), math.cos(N * phi)
+            e = (-K * w * sin, K * w * cos)
+            u = [R * want[k] + e[k] + REGULATION * L * (want[k] - x[k]) for k in (0, 1)]
+            share = min(1.0, U / max(math.hypot(*u), 1e-300))
+            currents = [(share * u[k] - R * x[k] - e[k]) / L for k in (0, 1)]
+            torque = K * (c * cos - a * sin) - T_D * math.sin(4.0 * N * phi) - T - b * w
+            return [*currents, w, torque / J]
+
+        return rate
+
+    x = np.array([size * math.cos(N * held(field, 0.0)), size * math.sin(N * held(field, 0.0)), 0.0, 0.0])
+    if held(level, 0.0) < 0.5:
+        x *= motor.standstill_current
+    # Steps end at samples: between its own ends a step of 60 us does not resolve the 10 us of the driver.
+    ends = sorted({t for t, *_ in [*field, *level] if 0.0 < t < DURATION} | set(times.tolist()))
+    found = [x]
+    for begin, end in itertools.pairwise(ends):
+        amplitude = size * (motor.standstill_current if held(level, begin) < 0.5 else 1.0)
+        angle = N * held(field, begin)
+        want = (amplitude * math.cos(angle), amplitude * math.sin(angle))
+        x = solve_ivp(rates(want), (begin, end), x, "DOP853", t_eval=[end], rtol=1e-12, atol=1e-12).y[:, -1]
+        found += [x] if end in times else []
+    return np.array(found).T
+
+
+@pytest.mark.parametrize("seed", [*range(4), *(pytest.param(k, marks=pytest.mark.slow) for k in range(4, 50))])
+def test_a_run_with_a_winding_is_that_of_an_integration_of_the_circuit(seed: int) -> None:
+    """Electrical angle and currents of 50 random rotors; the errors of their tolerances that docs/theory.md tables, amplified in 0.02 s."""
+    scenario = random_case(seed)
+    exact = integrated(scenario)
+    N, rated = 0.25 * scenario.motors["m"].steps_per_revolution, scenario.motors["m"].rated_current
+    names = ("m_phase_a_current", "m_phase_b_current", "motor_angle")
+    for tolerance, bound in ((1e-8, 1e-4), (None, 1e-6), (1e-12, 1e-8)):
+        result = lm.simulate(scenario, relative_tolerance=tolerance)
+        assert result.attrs["solver"].startswith("dormand-prince")
+        for row, name, size in zip(exact, names, (rated, rated, 1.0 / N), strict=False):
+            assert np.abs(result[name].values - row).max() < bound * size, (tolerance, name)
+
+
+def slip(speed: float, torque: float) -> float:
+    """Load at which a rotor slips, damped against a shaft that turns as its field: only static pull-out is left."""
+    up, rise, steps = 0.1, 1.0, 100
+    field = [{"begin": up * k / steps, "duration": up / steps, "rise": speed * (k + 0.5) / steps * up / steps} for k in range(steps)]
+    scenario = lm.Scenario(
+        shafts={
+            "motor": {"inertia": 0.0, "torque": {"ramps": [{"begin": up, "duration": rise, "rise": torque}]}},
+            "field": {"inertia": 1.0, "speed": {"ramps": [{"duration": up, "rise": speed}]}},
+        },
+        motors={"m": {"shaft": "motor", **NEMA_17}},
+        command={"m": {"ramps": [*field, {"begin": up, "duration": rise, "rise": speed * rise}]}},
+        dampers={"d": {"input": "motor", "output": "field", "viscous_friction": 3e-3}},
+        simulation={"duration": up + rise, "sample_interval": 1e-3},
+    )
+    (found,) = lm.simulation.lost_steps(lm.simulate(scenario))
+    return (found.times[0] - up) / rise * torque
+
+
+@pytest.mark.parametrize("speed", [5.0, 60.0, 100.0, 200.0])
+def test_the_pull_out_torque_of_a_run_is_the_closed_form_of_the_circuit(speed: float) -> None:
+    """The load rises by 1.2 of it in a second, and the rotor needs about 10 ms to slip: 3 %."""
+    expected = float(lm.sizing.pull_out_torque(lm.Motor(**NEMA_17), speed))
+    assert slip(speed, 1.2 * expected) == pytest.approx(expected, rel=0.03)
+
+
+def test_at_rest_a_winding_holds_as_an_ideal_current_does() -> None:
+    """asin(T/T_H)/N, whatever the winding."""
+    load = {"ramps": [{"rise": 0.3, "duration": 0.05}]}
+    shafts = {"motor": {"inertia": 0.0, "viscous_friction": 2e-3, "torque": load}}
+    simulation = {"duration": 0.2, "sample_interval": 1e-2}
+    scenario = lm.Scenario(shafts=shafts, motors={"m": {"shaft": "motor", **NEMA_17}}, simulation=simulation)
+    end = lm.simulate(scenario, relative_tolerance=1e-10).motor_angle[-1]
+    assert float(end) == pytest.approx(-math.asin(0.3 / 0.44) / 50, rel=1e-8)
+
+
+def test_a_winding_is_refused_by_name_where_regimes_are_linear() -> None:
+    scenario = lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", {"axis.motor.supply_voltage": "24 V"})
+    for use in (
+        lambda: lm.simulate(scenario, solver="exact"),
+        lambda: lm.simulate(scenario, sensitivities=["axis.motor.holding_torque"]),
+        lambda: lm.linearize(scenario),
+        lambda: lm.Simulation(scenario, step=1e-3),
+        lambda: lm.portable.description(scenario),
+    ):
+        assert "supply_voltage" in refused(use)
+
+
+def test_the_check_runs_a_winding_and_compares_it_with_its_pull_out_curve() -> None:
+    short = ["--set", 'axis.motor.supply_voltage="24 V"', "--set", 'simulation.duration="0.1 s"']
+    answer = CliRunner().invoke(app, ["check", "stepper-belt-axis", *short])
+    assert answer.exit_code == 0, answer.exception
+    assert "safety" in answer.output
+
+
+@pytest.mark.parametrize("key", ["rated_current", "resistance_phase", "inductance_phase"])
+def test_a_supply_without_the_rest_of_the_winding_is_refused(key: str) -> None:
+    refused(lambda: lm.Motor(**{k: v for k, v in NEMA_17.items() if k != key}), match=f"lacks {key}, which its supply_voltage needs")

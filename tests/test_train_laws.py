@@ -1,5 +1,7 @@
 """The laws of the elements of a drive train: both solvers on each, closed forms, what commands and errors may be."""
 
+import ctypes as c
+import json
 import math
 from typing import Any
 
@@ -7,7 +9,11 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from lostmotion.simulation.runs import core_runs
+from lostmotion.simulation.runs.separate_trains import parts_of
 from refusals import refused, refuses
+from test_c_interface import OK
+from test_description import Scenario
 from test_drive_train import train
 
 
@@ -337,3 +343,295 @@ def test_a_clutch_does_not_break_away_when_another_contact_stops(solver: str) ->
     run = lm.simulate(scenario, solver=solver)
     for shaft in "ab":
         assert float(run[f"{shaft}_speed"][-1]) == pytest.approx(2.25 * (1.0 - 1.0 / 6.75), rel=1e-9)
+
+
+# --- parts of a drive train that nothing joins are solved alone ---
+
+
+MASSES: dict[str, Any] = {
+    "shafts": {
+        "a": {"inertia": 1e-3, "friction_torque": 0.02},
+        "x": {"inertia": 2e-3, "friction_torque": 0.05, "torque": {"amplitude": 0.4, "frequency": 3.0}},
+        "b": {"inertia": 0.5, "torque": 1.0},
+        "y": {"inertia": 1e-3, "viscous_friction": 1e-2},
+        "alone": {"inertia": 1.0, "torque": 0.3},
+    },
+    "gears": {
+        "g": {"input": "a", "output": "b", "ratio": 20.0, "stiffness": {"kind": "curve", "slopes": [0.0, 500.0], "breaks": [1e-3]}}
+    },
+    "clutches": {"c": {"kind": "safety", "input": "x", "output": "y", "torque": 0.2}},
+    "brakes": {"hold": {"shaft": "a", "torque": 0.3}},
+    "motors": {"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
+    "gravity": {"arm": {"shaft": "b", "mass": 1.0, "radius": 0.1, "error": 1e-3}},
+    "command": {"m": {"amplitude": 0.5, "frequency": 1.0}, "hold": {"steps": [{"height": 1.0, "time": 1.2}]}},
+    "initial": {"speeds": {"alone": 0.4}, "angles": {"b": 0.2}, "twists": {"g": 5e-4}},
+    "simulation": {"duration": 2.0, "sample_interval": 0.01},
+}  # fmt: skip
+
+
+def both_ways(scenario: lm.Scenario, monkeypatch: pytest.MonkeyPatch, **how: Any) -> tuple[Any, Any]:
+    """The run by its parts, and of all at once."""
+    by_parts = lm.simulate(scenario, **how)
+    monkeypatch.setattr(core_runs, "parts_of", lambda whole: [whole])
+    return by_parts, lm.simulate(scenario, **how)
+
+
+def finder() -> lm.Scenario:
+    """Without steps of encoders, of which rounding may decide which one is read."""
+    data = lm.load("direction-finder", {"simulation.duration": 1.0}).model_dump(exclude_none=True)
+    for own in data["controllers"].values():
+        own |= {"encoder": {"ideal": True}, "position_encoder": {"ideal": True, "shaft": own["shaft"]}}
+    return lm.Scenario(**data)
+
+
+@pytest.mark.parametrize("make", [finder, lambda: lm.Scenario(**MASSES)], ids=["finder", "masses"])
+def test_parts_give_the_dataset_of_the_whole(make: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    parts, whole = both_ways(make(), monkeypatch, energy=True)
+    assert list(parts) == list(whole)
+    for name in whole:
+        x, y = parts[name].values, whole[name].values
+        np.testing.assert_allclose(x, y, rtol=0.0, atol=1e-9 * np.abs(y).max(), err_msg=str(name))
+    for attribute in ("energy", "end_state"):
+        a, b = (json.loads(r.attrs[attribute]) for r in (parts, whole))
+        assert list(a) == list(b)
+        # Magnitudes are summed from switching to switching, of which a part has only its own.
+        sizes = {entry: d.pop(entry, 0.0) for d in (a, b) for entry in ("turned_over",)}
+        scale = max(abs(v) for v in (*b.values(), *sizes.values()))
+        assert list(a.values()) == pytest.approx(list(b.values()), abs=1e-10 * scale)
+    assert {k: parts.attrs[k] for k in ("switching_columns", "switching_count", "scenario")} == {
+        k: whole.attrs[k] for k in ("switching_columns", "switching_count", "scenario")
+    }
+    a, b = lm.switchings_of(parts), lm.switchings_of(whole)
+    for name in b:
+        np.testing.assert_allclose(a[name].values, b[name].values, rtol=0.0, atol=1e-9, err_msg=str(name))
+
+
+def test_by_the_adaptive_solver_too(monkeypatch: pytest.MonkeyPatch) -> None:
+    how: dict[str, Any] = {"solver": "dormand-prince", "relative_tolerance": 1e-11}
+    parts, whole = both_ways(lm.Scenario(**MASSES), monkeypatch, **how)
+    for name in ("a_speed", "b_angle", "y_speed", "alone_angle"):
+        assert np.abs(parts[name].values - whole[name].values).max() < 1e-7 * np.abs(whole[name].values).max()
+
+
+def test_what_joins_shafts_makes_them_one_part() -> None:
+    def groups(**change: Any) -> list[list[str]]:
+        return [list(part.shafts) for part in parts_of(lm.Scenario(**(MASSES | change)))]
+
+    assert groups() == [["a", "b"], ["x", "y"], ["alone"]]
+    assert groups(freewheels={"f": {"input": "alone", "output": "y"}}, initial={}) == [["a", "b"], ["x", "y", "alone"]]
+    elsewhere = {
+        "m": {
+            "reference": {"kind": "speed", "mean": 1.0}, "shaft": "b", "sample_time": 1e-3, "speed": {"gain": 0.01},
+            "encoder": {"ideal": True, "shaft": "a"},
+        }
+    }  # fmt: skip
+    hold = {"hold": MASSES["command"]["hold"]}
+    assert groups(controllers=elsewhere, command=hold) == [["a", "b"], ["x", "y"], ["alone"]]
+    assert parts_of(lm.load("two-motors-one-ring")) == [lm.load("two-motors-one-ring")]
+
+
+def test_speeds_are_shown_in_terms_of_the_last_shaft_of_their_own_part() -> None:
+    from lostmotion.reports.plots import overview
+
+    figure = overview(lm.simulate(lm.load("direction-finder", {"simulation.duration": 0.02})))
+    shown = {a.get_title(): [line.get_label() for line in a.get_lines()] for a in figure.axes}
+    for axis in ("traverse", "elevation"):
+        assert shown[f"Speed of {axis}"] == [f"{axis}_motor / 100", axis]
+
+
+def test_bits_do_not_depend_on_whether_parts_run_side_by_side(monkeypatch: pytest.MonkeyPatch) -> None:
+    scenario = lm.load("direction-finder", {"simulation.duration": 0.2})
+    beside = lm.simulate(scenario)
+    monkeypatch.setattr(core_runs, "SIDE_BY_SIDE", 0)
+    assert lm.simulate(scenario).identical(beside)
+
+
+# --- ratchets ---
+
+
+J_1, J_2, T, AHEAD = 0.2, 0.5, 3.0, 9.0
+
+
+def handle(teeth: int, restitution: float = 0.0) -> lm.Scenario:
+    """The drum runs ahead of a handle at rest, which a constant torque accelerates until it catches up."""
+    return lm.Scenario(
+        shafts={"handle": {"inertia": J_1, "torque": {"mean": -T}}, "drum": {"inertia": J_2}},
+        ratchets={"ratchet": {"input": "handle", "output": "drum", "teeth": teeth, "restitution": restitution}},
+        initial={"speeds": {"drum": AHEAD}},
+        simulation={"duration": 3.0, "sample_interval": 1e-3},
+    )
+
+
+def tooth(teeth: int) -> tuple[float, float]:
+    """The instant at which the pawl strikes, and with which speed: a t^2/2 - w t = -n pitch, the last tooth passed."""
+    a, pitch = T / J_1, 2.0 * math.pi / teeth
+    passed = math.floor(AHEAD**2 / (2.0 * a) / pitch)
+    u = math.sqrt(AHEAD**2 - 2.0 * a * passed * pitch)
+    return (AHEAD + u) / a, u
+
+
+@pytest.mark.parametrize("teeth", [1, 7, 12, 360])
+def test_it_holds_at_the_last_tooth_that_it_has_passed(teeth: int) -> None:
+    struck, u = tooth(teeth)
+    result = lm.simulate(handle(teeth))
+    instants = np.asarray(lm.switchings_of(result)["instant"])
+    assert instants[-1] == pytest.approx(struck, rel=1e-9)
+    t = np.asarray(result["time"])
+    begin = (T * struck + J_2 * AHEAD) / (J_1 + J_2)
+    after = t > struck
+    speed = begin + T / (J_1 + J_2) * (t[after] - struck)
+    for name in ("handle_speed", "drum_speed"):
+        assert np.asarray(result[name])[after] == pytest.approx(speed, rel=1e-12)
+    torque = np.asarray(result["ratchet_contact_torque"])
+    assert torque[after] == pytest.approx(T * J_2 / (J_1 + J_2), rel=1e-12)
+    assert np.all(torque[t < struck] == 0.0)
+    energy = lm.energy_of(result)
+    assert energy["ratchet: impacts"] == pytest.approx(0.5 * J_1 * J_2 / (J_1 + J_2) * u**2, rel=1e-11)
+    assert abs(energy["residual"]) < 1e-12 * energy["turned_over"]
+
+
+def test_a_pawl_that_bounces_comes_to_rest_on_its_tooth() -> None:
+    """Bounces under the slip acceleration T/J_1 end at the geometric series, none of them as far as a tooth."""
+    e, teeth = 0.3, 7
+    struck, u = tooth(teeth)
+    result = lm.simulate(handle(teeth, e))
+    instants = np.asarray(lm.switchings_of(result)["instant"])
+    assert instants[-1] == pytest.approx(struck + 2.0 * e * u * J_1 / T / (1.0 - e), rel=1e-9)
+    assert float(result["handle_speed"][-1]) == pytest.approx(float(result["drum_speed"][-1]), rel=1e-13)
+
+
+def test_it_begins_at_a_tooth_and_drives_at_once() -> None:
+    result = lm.simulate(handle(12).replace(**{"initial.speeds": {}}))
+    assert float(result["drum_speed"][-1]) == pytest.approx(T / (J_1 + J_2) * 3.0, rel=1e-12)
+
+
+def test_solvers_and_steps_agree() -> None:
+    scenario = handle(7, 0.3)
+    exact = lm.simulate(scenario)
+    adaptive = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11)
+    assert float(adaptive["drum_speed"][-1]) == pytest.approx(float(exact["drum_speed"][-1]), rel=1e-8)
+    simulation = lm.Simulation(scenario)
+    for _ in range(30):
+        simulation.advance(0.1, handle_load_torque=-T)
+    assert simulation["drum_speed"] == pytest.approx(float(exact["drum_speed"][-1]), rel=1e-11)
+
+
+def test_what_takes_no_impacts_says_so() -> None:
+    assert "ratchets.ratchet" in refused(lambda: lm.linearize(handle(7)))
+
+
+# --- stiffness that depends on the direction of twist ---
+
+
+K, BACKWARD, J = 200.0, 2.25, 0.5
+
+
+def periods() -> tuple[float, float]:
+    """Half periods [s] of an inertia J on the two sides of the curve."""
+    return math.pi * math.sqrt(J / K), math.pi * math.sqrt(J / (K * BACKWARD))
+
+
+def swing(amplitude: float, t: np.ndarray) -> np.ndarray:
+    """Angle of that inertia, released at an angle > 0: half periods of both sides in turn, with one speed at angle 0."""
+    one, other = periods()
+    turn = np.mod(t + 0.5 * one, one + other)
+    w = math.pi / one
+    forward = amplitude * np.sin(w * turn)
+    back = -amplitude / math.sqrt(BACKWARD) * np.sin(w * math.sqrt(BACKWARD) * (turn - one))
+    return np.where(turn < one, forward, back)
+
+
+def on_spring() -> lm.Scenario:
+    curve = {"kind": "curve", "slopes": [f"{K} N*m/rad"], "backward": BACKWARD}
+    return lm.Scenario(
+        shafts={"arm": {"inertia": J}},
+        springs={"bar": {"shaft": "arm", "stiffness": curve}},
+        initial={"angles": {"arm": "0.1 rad"}},
+        simulation={"duration": 3.0 * sum(periods()), "sample_interval": 0.003},
+    )
+
+
+@pytest.mark.parametrize(("solver", "error"), [("exact", 1e-13), ("dormand-prince", 1e-7)])
+def test_an_arm_on_a_spring_swings_by_half_periods_of_both_directions(solver: str, error: float) -> None:
+    result = lm.simulate(on_spring(), solver=solver)
+    assert result.arm_angle.values == pytest.approx(swing(0.1, result.time.values), abs=error)
+
+
+def test_the_twist_of_a_gearbox_swings_by_half_periods_in_the_short_form() -> None:
+    rotor, ratio, load = 2e-4, 50.0, 0.75
+    scenario = lm.Scenario(
+        motor={"kind": "torque_source", "rotor_inertia": rotor, "rated_torque": 1.0},
+        gearbox={
+            "ratio": ratio,
+            "rated_input_speed": 300.0,
+            "rated_output_torque": 50.0,
+            "stiffness": {"kind": "curve", "slopes": [K], "backward": BACKWARD},
+            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
+        },
+        load={"inertia": load},
+        initial={"twist": 0.01},
+        simulation={"duration": 1.0, "sample_interval": 0.002},
+    )
+    own = 1.0 / (1.0 / load + 1.0 / (rotor * ratio**2))
+    stretched = math.sqrt(J / own)
+    for what in (scenario, lm.Scenario(**scenario.long().model_dump())):
+        result = lm.simulate(what)
+        twist = result.twist if "twist" in result else result.gearbox_twist
+        assert twist.values == pytest.approx(swing(0.01, stretched * result.time.values), abs=1e-10)
+
+
+def test_gap_and_preload_hold_in_each_direction() -> None:
+    curve = lm.model.TorsionCurve(slopes=(100.0, 300.0), breaks=(0.02,), backward=2.0)
+    gap = lm.model.TorsionCurve(slopes=(100.0, 300.0), breaks=(0.02,), backward=2.0, backlash=0.01)
+    tight = lm.model.TorsionCurve(slopes=(100.0, 300.0), breaks=(0.02,), backward=2.0, preload=2.0)
+    for d in (0.001, 0.015, 0.02, 0.05):
+        forward = 100.0 * d if d <= 0.02 else 2.0 + 300.0 * (d - 0.02)
+        assert curve.torque(d) == pytest.approx(forward, rel=1e-14)
+        assert curve.torque(-d) == pytest.approx(-2.0 * forward, rel=1e-14)
+        assert gap.torque(d + 0.005) == pytest.approx(forward, rel=1e-12)
+        assert gap.torque(-d - 0.005) == pytest.approx(-2.0 * forward, rel=1e-12)
+        assert gap.torque(0.004) == gap.torque(-0.004) == 0.0
+        # The preload of 2 N m is reached at 20 mrad forward, at 10 mrad backward.
+        assert tight.torque(d) == pytest.approx(300.0 * d, rel=1e-14)
+        assert tight.torque(-d) == pytest.approx(-200.0 * d if d <= 0.01 else -2.0 - 600.0 * (d - 0.01), rel=1e-12)
+    for what in (curve, gap, tight):
+        core = what.core()
+        for torque in (-7.0, -1.0, 0.5, 11.0):
+            assert what.torque(core.twist(torque)) == pytest.approx(torque, rel=1e-13)
+
+
+def test_both_solvers_agree_with_backlash_and_hysteresis_in_each_direction() -> None:
+    scenario = lm.load("paper-2dof-nl-large").replace(
+        **{"gearbox.stiffness.backward": 1.5, "simulation.duration": 0.5, "simulation.sample_interval": 0.01}
+    )
+    exact, stepped = (lm.simulate(scenario, solver=solver) for solver in ("exact", "dormand-prince"))
+    for name in ("motor_speed", "load_speed", "twist", "output_torque"):
+        size = float(np.abs(exact[name].values).max())
+        assert stepped[name].values == pytest.approx(exact[name].values, abs=1e-5 * size)
+    odd = lm.simulate(scenario.replace(**{"gearbox.stiffness.backward": 1.0}))
+    assert float(np.abs(odd.twist.values - exact.twist.values).max()) > 1e-5
+
+
+def test_what_takes_one_curve_for_both_directions_refuses_it() -> None:
+    drive = lm.load("paper-2dof-nl-large").replace(**{"gearbox.stiffness.backward": 1.5})
+    assert "differs between the two directions of twist" in refused(drive.gearbox.stiffness.pieces)
+    assert "backward: 0.0 must be greater than 0" in refused(lambda: lm.model.TorsionCurve(slopes=[1.0], backward=0.0))
+
+
+def test_the_half_periods_follow_from_the_derivative_by_the_factor() -> None:
+    key = "springs.bar.stiffness.backward"
+    result = lm.simulate(on_spring(), sensitivities=[key])
+    # Behind the first half period angle and speed are those of the closed form, whose differences are good to 1e-6.
+    h = 1e-5
+    one, other = (lm.simulate(on_spring().replace(**{key: BACKWARD + s * h})).arm_angle.values for s in (1.0, -1.0))
+    assert result.arm_angle_sensitivity.sel(parameter=key).values == pytest.approx((one - other) / (2.0 * h), abs=1e-6)
+
+
+def test_programs_without_python_run_and_change_it(library: c.CDLL) -> None:
+    scenario = lm.load("paper-2dof-nl-large").replace(
+        **{"gearbox.stiffness.backward": 1.5, "simulation.duration": 0.3, "simulation.sample_interval": 0.01}
+    )
+    there = Scenario(library, lm.portable.description(scenario))
+    assert there.set("gearbox.stiffness.backward", 1.2) == OK
+    here = lm.simulate(scenario.replace(**{"gearbox.stiffness.backward": 1.2}))
+    assert np.array_equal(there.run()["twist"], here.twist.values)
