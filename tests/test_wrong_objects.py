@@ -181,7 +181,7 @@ if find_spec("mujoco_warp") is not None:
     import mujoco_warp
 
     FREE = mujoco.MjModel.from_xml_string("<mujoco><worldbody><body><joint name='j'/><geom size='0.1'/></body></worldbody></mujoco>")
-    CALLS["warp.attach"] = (lm.warp.attach, {"model": FREE, "m": mujoco_warp.put_model(FREE), "d": mujoco_warp.make_data(FREE), "drives": {"j": "schaeffler-rt1-h-20-100"}, "stiffness": 1.0, "damping": 0.0, "samples": 1, "dtype": "float64"})  # fmt: skip
+    CALLS["warp.attach"] = (lm.warp.attach, {"model": FREE, "m": mujoco_warp.put_model(FREE), "d": mujoco_warp.make_data(FREE), "drives": {"j": "schaeffler-rt1-h-20-100"}, "stiffness": 1.0, "damping": 0.0, "samples": 1, "dtype": "float64", "replace": False})  # fmt: skip
 
 
 def names() -> list[str]:

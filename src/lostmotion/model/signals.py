@@ -166,7 +166,7 @@ class TimeFunction(Part, Generic[V]):
         waiting = deque(sorted(pieces, key=lambda piece: piece[0][0]))
         active: list[list[Breakpoint]] = []
         final = 0.0  # sum of the pieces that are past their last breakpoint and constant from there on
-        for time in sorted({0.0, *(point[0] for piece in pieces for point in piece)}):
+        for time in sorted(dict.fromkeys((0.0, *(point[0] for piece in pieces for point in piece)))):
             while waiting and waiting[0][0][0] <= time:
                 active.append(waiting.popleft())
             here = [_at(piece, time, self.derivatives) for piece in active]
