@@ -205,9 +205,12 @@ def test_the_motion_tends_to_a_limit_as_its_ratio_goes_to_zero(ratio: float) -> 
     assert 1e-3 * ratio < apart < 1e-2 * ratio
 
 
-@pytest.mark.parametrize("ratio", [1e-2, 1e-4, 1e-6, 3e-7])
+@pytest.mark.parametrize("ratio", [1e-2, 1e-4, 1e-6, 3e-7, 1e-7])
 def test_the_ledger_of_a_locked_worm_keeps_changes_far_below_what_it_stores(ratio: float) -> None:
-    """The load stores 0.02 J in the mesh. The motor winds the coupling to T i/k and lets it go down to its friction."""
+    """The load stores 0.02 J in the mesh. The motor winds the coupling to T i/k and lets it go down to its friction.
+
+    Below 5e-7 the damper stops the rotor within the rounding of the instant.
+    """
     run = lm.simulate(lm.load(NAMED["worm-lowering"], {"gears.coupling.ratio": ratio}), energy=True)
     energy = lm.energy_of(run)
     torque, friction, k = 0.15, 0.01, 500.0
@@ -219,9 +222,9 @@ def test_the_ledger_of_a_locked_worm_keeps_changes_far_below_what_it_stores(rati
     assert "warning" not in run.attrs
 
 
-@pytest.mark.parametrize("ratio", [1e-7, 1e-8])
+@pytest.mark.parametrize("ratio", [1e-8, 1e-9])
 def test_a_motion_faster_than_the_clock_is_no_accumulation(ratio: float) -> None:
-    """The damper of the coupling slows the rotor at c/(i^2 J) = 2.5e16 1/s and more: 1e-17 s is 0 beside 0.1 s."""
+    """The damper of the coupling slows the rotor at c/(i^2 J) = 2.5e18 1/s and more: 4e-19 s is 0 beside 0.1 s."""
     with pytest.raises(lm.SolverError, match="or what numbers resolve") as refusal:
         lm.simulate(lm.load(NAMED["worm-lowering"], {"gears.coupling.ratio": ratio}))
     assert "accumulate" not in str(refusal.value)

@@ -205,15 +205,21 @@ SensitivityTally compare_random(unsigned seed, int trains, bool closed_loop) {
 }  // namespace
 
 // A twist breaks away with an acceleration of zero, while a shaft at its limit ends the regime within 1e-16 s.
-TEST_CASE("a run may be split before a break-away that another contact at its limit cuts short") {
+// Trains of seed 3. A contact at its limit cuts the break-away of train 389 short. In train 2119 three contacts of one
+// rigid group are violated alike, and the order in which they are tried chooses one of several motions.
+TEST_CASE("break-aways beside contacts at their limits obey all laws of a run") {
     RandomTrains random(3);
-    for (int n = 0; n < 389; ++n) {
+    LawTally tally;
+    for (int n = 0; n <= 2119; ++n) {
+        if (n == 389 || n == 2119) {
+            check_laws(random, 6, 0.4, tally);
+            continue;
+        }
         const RandomRun before(random, 6, 0.4);
         random.uniform(0.1, 0.9);
     }
-    LawTally tally;
-    check_laws(random, 6, 0.4, tally);
-    CHECK(tally.runs == 1);
+    CHECK(tally.runs == 2);
+    CHECK(tally.mirrored > 0);
     CHECK(tally.failed() == 0);
 }
 

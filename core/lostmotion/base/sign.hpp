@@ -27,18 +27,22 @@ struct Sign {
     double relative = 0.0;  // to the sum of the magnitudes of its terms
 };
 // The sign that a form has just after now, from its value and the sum of the magnitudes of its terms: that of the first
-// of its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero now.
+// of its derivatives that is not zero. 0 if it stays at zero or, if asked by value alone, is zero now. What decays
+// within the rounding of the instant has no derivative that is clear of it: then the first that is clear of the
+// rounding of its terms decides.
 template <class F, class Form>
 Sign sign_after(F& flow, const Form& form, double value, double size, bool by_value_alone = false) {
+    Sign unresolved;
     for (int k = 0; k + 1 < n_derivatives; ++k) {
         const double rate = flow.rate(form, k + 1);
-        if (std::fabs(value) > flow.noise(size, rate))
-            return {value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
+        const Sign here{value > 0.0 ? +1 : -1, k, size > 0.0 ? value / size : 0.0};
+        if (std::fabs(value) > flow.noise(size, rate)) return here;
         if (by_value_alone) return {};
+        if (unresolved.sign == 0 && std::fabs(value) > flow.noise(size, 0.0)) unresolved = here;
         value = rate;
         size = flow.rate_magnitude(form, k + 1);
     }
-    return {};
+    return unresolved;
 }
 
 }  // namespace lostmotion

@@ -300,18 +300,19 @@ double SwitchedTrain::combinations(const Event& event) const {
     return n;
 }
 
-// One of them: the last contact changes first, from stuck to forward to backward. next(n): the mode of the next
-// contact, below n. Returns how many contacts slip.
+// One of them: the last contact changes first, from stuck to the way of the event to the other way. next(n): the mode
+// of the next contact, below n. Returns how many contacts slip.
 template <class Next>
 int SwitchedTrain::combination(Next&& next, const Event& event, const Key& from, Key& out) const {
     int slips = 0;
+    const int ahead = event.ahead();
     for (int c = contacts(); c-- > 0;) {
         const ContactPlace& p = places().contacts[c];
         if (p.bilateral) continue;
         out.modes[c] = from.modes[c];
         if (event.at_rest[c]) {
             const std::uint64_t mode = next(std::uint64_t{p.one_way ? 2u : 3u});
-            out.modes[c] = mode == 0 ? 0 : mode == 1 && !p.one_way ? +1 : -1;
+            out.modes[c] = static_cast<std::int8_t>(mode == 0 ? 0 : p.one_way ? -1 : mode == 1 ? ahead : -ahead);
         }
         slips += out.modes[c] != 0;
     }
@@ -520,11 +521,14 @@ Found SwitchedTrain::pivot(Instant& now, const Event& event, Key modes, const Ke
             return !event.at_rest[v.contact] || modes.modes[v.contact] == v.mode;
         });
         if (violations.empty() && trial.found == Found::inconsistent) violations = of_neighbours(modes, event);
-        // Contacts that are tied together are violated alike, to rounding: then by their order.
-        std::stable_sort(violations.begin(), violations.end(), [](const Violation& a, const Violation& b) {
-            const auto share = [](const Violation& v) { return static_cast<float>(v.relative); };
-            return a.order != b.order ? a.order < b.order : share(a) > share(b);
-        });
+        // Contacts that are tied together are violated alike, to rounding: then by their order, as in a mirror.
+        std::stable_sort(violations.begin(), violations.end(),
+                         [ahead = event.ahead()](const Violation& a, const Violation& b) {
+                             const auto share = [](const Violation& v) { return static_cast<float>(v.relative); };
+                             if (a.order != b.order) return a.order < b.order;
+                             if (share(a) != share(b)) return share(a) > share(b);
+                             return a.contact != b.contact ? a.contact < b.contact : a.mode * ahead < b.mode * ahead;
+                         });
         path.push_back(tried.size());
         tried.push_back({modes, std::move(violations)});
         while (!path.empty() && !lead_on(tried[path.back()])) path.pop_back();

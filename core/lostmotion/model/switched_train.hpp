@@ -109,6 +109,11 @@ class SwitchedTrain {
             return (by_value && g.kind != Guard::set_off) ||
                    (with_guard && kind == Guard::speed && g.kind == Guard::capacity && g.contact == contact);
         }
+        // The way in which its contact gives way or has slipped: what is tried in turn is tried so in a mirror, too.
+        int ahead() const {
+            if (!with_guard || contact == nowhere) return 1;
+            return (kind == Guard::capacity ? neighbour : before.modes[contact]) < 0 ? -1 : 1;
+        }
         // A contact that has been at its limit up to the end of a regime has no margin there: a value is what an
         // elimination has left of larger terms. Contacts that stop may take its torque with a jump.
         bool was_at_limit(const Guard& g) const {
