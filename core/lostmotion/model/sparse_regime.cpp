@@ -7,6 +7,9 @@ namespace lostmotion::model {
 
 namespace {
 
+// The share of a guard, at rated load and speed, of a term that is rounding.
+constexpr double left_by_elimination = 64.0 * std::numeric_limits<double>::epsilon();
+
 // The speeds that are given, and those that follow these alone.
 std::vector<GivenState> given_states(const Regime& r, const Places& places) {
     std::vector<GivenState> out;
@@ -91,12 +94,19 @@ SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const d
     guards.reserve(r.guards.size());
     near_event.reserve(r.guards.size());
     for (const model::Guard& g : r.guards) {
-        const LinearForm& f = guards.emplace_back(g.with(sparse(g.form))).form;
+        Row f = g.form;
+        const auto each_variable = [&](auto&& use) {
+            for (int k = 0; k < n.coupled; ++k) use(f.c[k], near_state[static_cast<std::size_t>(k)]);
+            for (int i = 0; i < n.inputs; ++i) use(f.c[n.first_input + i], near_input[static_cast<std::size_t>(i)]);
+        };
         double near = 0.0;
-        for (const auto& [k, factor] : f.of_coupled())
-            near += std::fabs(factor) * near_state[static_cast<std::size_t>(k)];
-        for (const auto& [i, factor] : f.of_inputs())
-            near += std::fabs(factor) * near_input[static_cast<std::size_t>(i)];
+        each_variable([&](double factor, double size) { near += std::fabs(factor) * size; });
+        // Contacts at their limits leave all torques at rest to one elimination. What it has left of a term that is
+        // none must not decide where all other terms are zero.
+        each_variable([&](double& factor, double size) {
+            if (!r.drivers.empty() && std::fabs(factor) * size <= left_by_elimination * near) factor = 0.0;
+        });
+        guards.push_back(g.with(sparse(f)));
         near_event.push_back(near);
     }
     for (const Driver<Row>& d : r.drivers) drivers.push_back({d.contact, sparse(d.torque), sparse(d.rate)});
