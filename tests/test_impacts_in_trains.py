@@ -148,6 +148,26 @@ def test_flanks_accumulate_beside_others_that_part_for_long() -> None:
     compare([312, 458, 722, 1247, 1521, 1660, 1695, 1876], 61, friction=True)
 
 
+@pytest.mark.parametrize("duration", [0.14, 0.2, 0.3])
+def test_an_elastic_flank_comes_to_rest_where_others_lose_energy(duration: float) -> None:
+    """At 0.115 s an elastic flank has struck a thousand times in turn with an inelastic one; a strike at 0.155 s finds both touching."""
+    parts: dict[str, Any] = {
+        "inertias": np.array([0.6354, 0.5691, 0.01062, 0.6555]),
+        "torques": np.array([-0.02151, 0.451, 0.3598, 0.4093]),
+        "friction": np.zeros(4),
+        "ratios": np.array([1.0, -1.0, 0.5]),
+        "backlash": np.array([0.005143, 0.008681, 0.006281]),
+        "restitution": np.array([0.6423, 1.0, 0.0]),
+        "speeds": np.array([-0.02153, 0.0617, -0.0008742, 0.04054]),
+        "twists": np.array([-0.001894, 0.00153, 0.002665]),
+    }
+    chain = Chain(**parts)
+    result = lm.simulate(Chain(**parts).scenario(duration))
+    size = np.array([*4 * [0.1], *parts["backlash"]])
+    chain.run(duration)
+    assert np.all(np.abs(at_end(result, chain) - chain.end) < 1e-10 * size)
+
+
 # --- gears that lock in motion ---
 
 

@@ -3,7 +3,7 @@
 // With an approach acceleration a > 0, flanks of one gear that part at the speed v meet again after 2 v/a, at the speed
 // v, and the sum of all further flights is 2 v/(a (1 - e)). Flights that are less high than a share of the backlash are
 // replaced by contact with the same mean torque: a clock runs for the sum of their durations, and then they touch. It
-// does not run down where nothing is lost (e = 1).
+// does not run down where none of those that fly loses energy (e = 1).
 //
 // Flanks of several gears strike in turn. Let K be the kinetic energy of their approach speeds u, delta their gaps,
 // lambda the torques that would press them if all touched. K + sum lambda delta is constant in flight and falls with
@@ -171,17 +171,16 @@ double SwitchedTrain::time_to_rest(const SparseRegime& r, const Instant& now, co
                        2.0 * std::sqrt(2.0 * joined.inertia(f)) / torque, 1.0 / (1.0 - flank.restitution)});
     }
     double time = 0.0;
-    bool elastic = false;
-    for (const Pressed& p : all) {
-        const bool ends = std::isfinite(p.flights);
-        time = std::fmax(time, p.flight * std::sqrt(energy) * (ends ? p.flights : 1.0));
-        elastic = elastic || !ends;
-    }
+    for (const Pressed& p : all)
+        time = std::fmax(time, p.flight * std::sqrt(energy) * (std::isfinite(p.flights) ? p.flights : 1.0));
     const bool small = std::all_of(all.begin(), all.end(), [&](const Pressed& p) {
         return energy <= p.most * p.torque && std::fabs(p.rate) * time <= 1e-4 * p.torque;
     });
     if (!small && !(time <= unresolved * std::fabs(now.time))) return -1.0;
-    return elastic ? for_ever : time;
+    // Where one that flies loses energy, the others strike ever less, too.
+    const bool loses = std::any_of(joined.flanks.begin(), joined.flanks.end(),
+                                   [](const Flank& f) { return f.accumulates && f.restitution < 1.0; });
+    return loses ? time : for_ever;
 }
 
 Found SwitchedTrain::strikes(Instant& now, const Guard& fired, Key& key) {
