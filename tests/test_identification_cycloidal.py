@@ -44,7 +44,7 @@ def baseline() -> lm.identification.IdentificationResult:
 def split() -> lm.identification.IdentificationResult:
     """The shipped file and logs of the split pin wheel, identified from the start values alone; the baseline is sought from others, too."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(candidate_models, "_other_minima", lambda *arguments: (arguments[5], []))
+        patch.setattr(candidate_models, "_other_minima", lambda problem, first, best, *others: (best, []))
         return lm.identify(EXAMPLE / "split-pinwheel.toml")
 
 

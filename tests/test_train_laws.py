@@ -12,7 +12,7 @@ import lostmotion as lm
 from lostmotion.simulation.runs import core_runs
 from lostmotion.simulation.runs.separate_trains import parts_of
 from refusals import refused, refuses
-from test_c_interface import OK
+from test_c_interface import OK, library  # noqa: F401
 from test_description import Scenario
 from test_drive_train import train
 
@@ -627,7 +627,7 @@ def test_the_half_periods_follow_from_the_derivative_by_the_factor() -> None:
     assert result.arm_angle_sensitivity.sel(parameter=key).values == pytest.approx((one - other) / (2.0 * h), abs=1e-6)
 
 
-def test_programs_without_python_run_and_change_it(library: c.CDLL) -> None:
+def test_programs_without_python_run_and_change_it(library: c.CDLL) -> None:  # noqa: F811
     scenario = lm.load("paper-2dof-nl-large").replace(
         **{"gearbox.stiffness.backward": 1.5, "simulation.duration": 0.3, "simulation.sample_interval": 0.01}
     )

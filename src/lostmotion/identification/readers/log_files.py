@@ -43,41 +43,40 @@ READERS: dict[str, Callable[..., Log]] = {
 def read_log(path: str | Path, *, time: str = "", decimal: str = "") -> Log:
     """Read a log of any of the formats in ``docs/identification.md``, by the ending of its name.
 
-        Parameters
-        ----------
-        path : str or Path
-            File of the log.
-        time : str
-            Name of the channel of the time, if it is not found automatically. For an MCAP file or a bag: the topic, or
-            ``TOPIC.header.stamp``.
-        decimal : str
-            Decimal separator in text, ``"."`` or ``","``. If empty, a comma is taken only if the text has no other reading, and the log
-            has a note on it.
+    Parameters
+    ----------
+    path : str or Path
+        File of the log.
+    time : str
+        Name of the channel of the time, if it is not found automatically. For an MCAP file or a bag: the topic, or
+        ``TOPIC.header.stamp``.
+    decimal : str
+        Decimal separator in text, ``"."`` or ``","``. If empty, a comma is taken only if the text has no other reading, and the log
+        has a note on it.
 
-        Returns
-        -------
-        Log
-            Channels with units, header and notes.
+    Returns
+    -------
+    Log
+        Channels with units, header and notes.
 
-        Raises
-        ------
-        InputError
-            The file cannot be read, or needs more memory than the limit. The message names the file and the remedy.
-        MissingLibraryError
-            The library of the format is not installed.
+    Raises
+    ------
+    InputError
+        The file cannot be read, or needs more memory than the limit. The message names the file and the remedy.
+    MissingLibraryError
+        The library of the format is not installed.
 
-        Examples
-        --------
-        >>> from dataclasses import replace
-    from pathlib import Path
-        >>> from tempfile import TemporaryDirectory
-        >>> import lostmotion as lm
-        >>> with TemporaryDirectory() as folder:
-        ...     path = Path(folder, "log.csv")
-        ...     _ = path.write_text("time [s],angle [deg]\\n0.0,0\\n0.1,1\\n0.2,3\\n")
-        ...     log = lm.identification.read_log(path)
-        >>> [channel for channel in log.channels]
-        ['angle']
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from tempfile import TemporaryDirectory
+    >>> import lostmotion as lm
+    >>> with TemporaryDirectory() as folder:
+    ...     path = Path(folder, "log.csv")
+    ...     _ = path.write_text("time [s],angle [deg]\\n0.0,0\\n0.1,1\\n0.2,3\\n")
+    ...     log = lm.identification.read_log(path)
+    >>> [channel for channel in log.channels]
+    ['angle']
     """
     path = Path(path)
     if decimal not in ("", ".", ","):

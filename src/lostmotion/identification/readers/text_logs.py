@@ -105,12 +105,15 @@ def _without_cut_number(text: str) -> tuple[str, tuple[str, ...]]:
 
     A file that was cut off within a number has another number there, which nothing else shows.
     """
-    body, _, last = text.rpartition("\n")
-    ends = [len(LAST_CELL.sub("", line)) for line in body.splitlines()[-COMPARED:]]
+    begin = len(text)
+    for _ in range(COMPARED + 1):  # the rest of a long text is not copied
+        begin = text.rfind("\n", 0, max(begin, 0))
+    *lines, last = text[begin + 1 :].split("\n")
+    ends = [len(LAST_CELL.sub("", line)) for line in lines]
     if len(ends) < COMPARED or not last or len(LAST_CELL.sub("", last)) >= min(ends):
         return text, ()
     line = text.count("\n") + 1
-    return body + "\n", (
+    return text[: -len(last)], (
         f"line {line} has no end and is left out: {last[-40:]!r} may be cut off within its last number",
     )
 

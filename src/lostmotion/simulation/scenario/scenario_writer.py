@@ -1,5 +1,6 @@
 """A scenario file with some values changed, its comments and its order kept."""
 
+import itertools
 import os
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
@@ -16,7 +17,7 @@ from ...inputs.toml_files import RESULTS, is_in_file
 from ..forms.dotted_keys import list_index
 from ..forms.key_aliases import in_file
 from .scenario import Scenario
-from .scenario_files import CHANGED, find_base, find_scenario, scenario_text
+from .scenario_files import find_base, find_scenario, scenario_text
 from .scenario_files import load as load_file
 from .shipped_scenarios import shipped_scenarios
 
@@ -39,11 +40,12 @@ def write_changed(
     Raises InputError: the file cannot be written; nothing is left behind.
     """
     texts = []
-    changes = {**changes, **({"title": scenario.title} if CHANGED in scenario.title else {})}
-    for inline in (False, True) if Path(source).suffix not in RESULTS else ():
+    # A file may need its title, which it otherwise has from its base or without what has changed.
+    ways = itertools.product((changes, {**changes, "title": scenario.title}), (False, True))
+    for values, inline in ways if Path(source).suffix not in RESULTS else ():
         # A file may have a shape in which these values cannot be changed.
         with suppress(TOMLKitError, KeyError, TypeError, ValueError, AttributeError):
-            texts.append(changed_text(find_scenario(source), changes, target, notes, inline))
+            texts.append(changed_text(find_scenario(source), values, target, notes, inline))
     texts.append(scenario_text(scenario, "\n".join(f"{MARK[2:]}{note}" for note in notes)))
 
     def write(temporary: Path) -> None:
