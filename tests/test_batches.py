@@ -479,6 +479,31 @@ def test_a_train_of_one_gear_is_walked_under_its_own_names() -> None:
     assert long.counts["general"] < long.counts["steps"]
 
 
+@pytest.mark.parametrize("backdrive", [0.8, -0.2])
+def test_flanks_that_part_where_losses_change_their_side_need_no_other_solver(backdrive: float) -> None:
+    """The torque of a mesh ends at the edge of its gap, which is also that between losses of driving and of overrunning."""
+    generator = np.random.default_rng(5)
+    losses = {"kind": "mesh_efficiency", "drive_efficiency": 0.7, "backdrive_efficiency": backdrive}
+    trains = [
+        lm.DriveTrain(
+            shafts={"m": {"inertia": 0.0}, "l": {"inertia": inertia, "viscous_friction": 2.0}},
+            motors={"motor": {"shaft": "m", "kind": "torque_source", "rotor_inertia": 1e-4, "friction_torque": 0.02}},
+            gears={"g": {"input": "m", "output": "l", "ratio": 50.0, "stiffness": {"kind": "curve", "slopes": [1e4], "backlash": 2e-3},
+                         "losses": losses, "rated_input_speed": 400.0, "rated_output_torque": 50.0}},
+        )
+        for inertia in generator.uniform(0.3, 2.0, 6).tolist()
+    ]  # fmt: skip
+    batch, alone = lm.SimulationBatch(trains, STEP), [lm.Simulation(lm.Scenario.of_any(t), step=STEP) for t in trains]
+    for row in generator.uniform(-0.5, 0.5, (300, 6)):
+        batch.step(row)
+        for one, torque in zip(alone, row.tolist(), strict=True):
+            one.advance(STEP, command=torque)
+    for name in ("l_angle", "l_speed", "m_speed"):
+        np.testing.assert_allclose(batch[name], [one[name] for one in alone], rtol=1e-9, atol=1e-12)
+    assert batch.counts["general"] == 0
+    assert batch.counts["with_events"] > 300
+
+
 def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:
     # A loss map ends far outside its data: a load torque that no gear carries.
     drive = random_drive(np.random.default_rng(0)).model_copy(update={"gearbox": lm.load("paper-2dof-nl-small").gearbox})

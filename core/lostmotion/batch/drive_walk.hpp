@@ -735,7 +735,16 @@ struct DriveWalk : Magnitudes {
             if (v == unsure) return false;
             if (halve) return true;
             if (v == yes) continue;
-            if (magnitude(at - first.at) < together()) first.doubtful = true;
+            if (magnitude(at - first.at) < together()) {
+                // Where flanks part without a torque the losses have an edge, too: the regime in the gap has its own
+                // cell.
+                const bool parts = is_end_of_flank(g) && is_of_losses(first.guard);
+                if (parts || (is_end_of_flank(first.guard) && is_of_losses(g))) {
+                    if (parts) first.guard = g;
+                    continue;
+                }
+                first.doubtful = true;
+            }
             if (at < first.at) {
                 if (first.at - at >= together()) first.doubtful = false;
                 first.guard = g;
@@ -745,6 +754,10 @@ struct DriveWalk : Magnitudes {
         return true;
     }
 
+    bool is_end_of_flank(int g) const {
+        return r.guards[g].kind == piece && laws.has_gap && x.piece + r.guards[g].to == laws.zero;
+    }
+    bool is_of_losses(int g) const { return r.guards[g].kind == cell || r.guards[g].kind == back; }
     // Does a guard whose cubic is c stay positive, or does it fall later than another that falls `before`? No: it falls
     // through zero once, there.
     Verdict judge(const Form& f, const real* c, real rest, real s, real before, bool fresh, real& at,
