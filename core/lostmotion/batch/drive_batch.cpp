@@ -80,7 +80,7 @@ struct Lanes {
     static constexpr std::size_t count = 4;
     DriveWalk walks[count];
 
-    // Of each number of the walks, one lane.
+    // A number of each walk, one in each lane.
     lanes::real of(auto&& number) const {
         return lanes::real{number(walks[0]), number(walks[1]), number(walks[2]), number(walks[3])};
     }
@@ -90,7 +90,8 @@ struct Lanes {
             of([&](const DriveWalk& w) { return of_walk(w).q; }), of([&](const DriveWalk& w) { return of_walk(w).a; }),
             of([&](const DriveWalk& w) { return of_walk(w).v; }), of([&](const DriveWalk& w) { return of_walk(w).d; })};
     }
-    // Moves those on by a time h whose regime is seen to last, all of which have entered theirs. Returns a bit of each.
+    // Moves the drives whose regime is sure to last over a time h. All have entered their regimes. Returns a bit for
+    // each drive, 1 where it has moved.
     unsigned move(double h, const DriveLaws& laws) {
         const lanes::DriveRates r{form([](const DriveWalk& w) -> auto& { return w.r.q; }),
                                   form([](const DriveWalk& w) -> auto& { return w.r.a; }),
@@ -316,7 +317,7 @@ void DriveBatch::step_lanes(std::size_t first, const Input& command, const Input
     Lanes all{{walk(first), walk(first + 1), walk(first + 2), walk(first + 3)}};
     bool well[Lanes::count], entered = true;
     for (std::size_t i = 0; i < Lanes::count; ++i) entered &= well[i] = all.walks[i].enter();
-    // Series that are made in vain cost time: where few drives last, others of their kind are left alone for a while.
+    // Series in vain cost time: after a group in which few drives moved, some groups are stepped one by one.
     unsigned moved = 0;
     if (entered && worker.left_alone == 0) {
         moved = all.move(step_, kind(first).laws());
