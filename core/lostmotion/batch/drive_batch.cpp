@@ -52,8 +52,8 @@ auto& at(auto& list, int place) { return list[static_cast<std::size_t>(place)]; 
 
 // use(number, number of the drive, sign): what the general solver has in the place of a number of a drive. turned: -1
 // where the output turns against the input.
-template <class Use>
-void each_number(const model::Assembly& a, int turned, MotionState& s, DriveState& x, Use&& use) {
+template <class State, class Use>
+void each_number(const model::Assembly& a, int turned, MotionState& s, State& x, Use&& use) {
     const model::Places& places = a.places();
     const model::GearPlace& gear = places.gears[0];
     const auto in = [&](auto& list, int place, auto& number, int sign = 1) {
@@ -303,11 +303,15 @@ void DriveBatch::step_range(std::size_t begin, std::size_t end, const Input& com
                                 ? walk(k, command[k], load_torque[k], answer, worker)
                                 : answer == nullptr && walk_under_control(k, command[k], load_torque[k], worker);
         if (!walked && !solve(k, command[k], load_torque[k], answer, worker)) continue;
-        times_[k] += step_;
-        inputs_[2 * k + 1] = load_torque[k];
+        end_step(k, load_torque[k]);
         if (!slopes_.empty()) follow_tangents(k, from);
-        show(k);
     }
+}
+
+void DriveBatch::end_step(std::size_t k, double load_torque) {
+    times_[k] += step_;
+    inputs_[2 * k + 1] = load_torque;
+    show(k);
 }
 
 void DriveBatch::step_lanes(std::size_t first, const Input& command, const Input& load_torque, Worker& worker) {
@@ -334,9 +338,7 @@ void DriveBatch::step_lanes(std::size_t first, const Input& command, const Input
             keep(k, w, command[k], worker);
         else if (!solve(k, command[k], load_torque[k], nullptr, worker))
             continue;
-        times_[k] += step_;
-        inputs_[2 * k + 1] = load_torque[k];
-        show(k);
+        end_step(k, load_torque[k]);
     }
 }
 
@@ -470,7 +472,7 @@ void DriveBatch::give_state(std::size_t k, ScenarioSimulation& simulation, Worke
     const model::GearPlace& gear = places.gears[0];
     const DriveNumbers& p = numbers(k);
     const int limit = places.motors[0].branch;
-    DriveState x = drives_[k];
+    const DriveState& x = drives_[k];
     MotionState& s = worker.state;
     s.clear();
     s.time = times_[k];

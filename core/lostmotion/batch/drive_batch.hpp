@@ -107,6 +107,7 @@ class DriveBatch {
     Worker& add_worker();
     void step_range(std::size_t begin, std::size_t end, const Input& command, const Input& load_torque,
                     LoadAnswer* answers, Worker& worker);
+    void end_step(std::size_t k, double load_torque);
     void step_lanes(std::size_t first, const Input& command, const Input& load_torque, Worker& worker);
     bool walk(std::size_t k, double command, double load_torque, LoadAnswer* answer, Worker& worker);
     void keep(std::size_t k, const DriveWalk& walk, double command, Worker& worker);
