@@ -627,7 +627,7 @@ def test_wear_adds_backlash_and_multiplies_losses():
 
 
 def test_a_title_of_a_base_names_the_values_that_a_file_over_it_changes(tmp_path: Path) -> None:
-    """The joint of the base swings at 1 Hz, that of the file at 2 Hz; a title of its own says what it says."""
+    """The joint of the base swings at 1 Hz, the joint of the file at 2 Hz. A file with a title keeps that title."""
     plain = lm.load("catalogue-robot-joint").title
     file = tmp_path / "mine.toml"
     file.write_text('base = "catalogue-robot-joint"\n[command]\nfrequency = "2 Hz"\n[simulation]\nduration = 1.0\n')

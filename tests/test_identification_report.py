@@ -187,7 +187,7 @@ def test_without_a_rig_the_file_is_whole_but_for_the_rig(logs: Path) -> None:
 
 
 def test_without_any_rig_a_template_is_written_that_the_file_takes(logs: Path, tmp_path: Path) -> None:
-    """Of a length that of a slide, of an angle that of a shaft, whose variables the file names."""
+    """A log in lengths gets the rig of a slide, a log in angles that of a shaft. The file names the variables of that rig."""
     for k, (name, unit) in enumerate((("slide", "mm"), ("load", "deg"))):
         folder = tmp_path / str(k)
         folder.mkdir()

@@ -348,7 +348,7 @@ TURNING = (
 
 
 def test_a_motor_on_its_joint_is_reduced_to_its_own_numbers() -> None:
-    """As `lostmotion identify` writes an axis of one shaft: all inertia is that of the rotor, and the joint carries nothing else."""
+    """`lostmotion identify` writes an axis of one shaft like this: the rotor has all inertia, and the joint carries nothing else."""
     motor = {"kind": "torque_source", "shaft": "table", "rotor_inertia": 0.02, "rated_torque": 1.0}
     axis = lm.Scenario(
         shafts={"table": {"friction_torque": 0.1, "viscous_friction": 0.05}},

@@ -34,7 +34,7 @@ def motor_speed_over_torque() -> Any:
 
 
 def amplitude_of(run: Any, name: str, f: float, begin: float) -> complex:
-    """Of a sine in a run after its transient, by least squares over whole periods."""
+    """The sine in a run after its transient, by least squares over whole periods."""
     last = run["time"].to_numpy() >= begin - 0.1 * T
     t, y = run["time"].to_numpy()[last][:-1], run[name].to_numpy()[last][:-1]
     basis = np.column_stack([np.sin(2 * np.pi * f * t), np.cos(2 * np.pi * f * t), np.ones_like(t)])

@@ -312,7 +312,7 @@ def scenario(reference: dict[str, Any], camera: dict[str, Any], tracker: dict[st
 
 
 def expected(s: lm.Scenario) -> tuple[np.ndarray, np.ndarray]:
-    """What the tracker expects at the ticks [rad], and where the target is."""
+    """The angles that the tracker expects at the ticks [rad], and those of the target."""
     r = lm.simulate(s, energy=False)
     return r["m_position_reference"].values, s.controllers["m"].reference.at(r.time.values)[0]
 
@@ -345,7 +345,7 @@ def test_with_alpha_and_beta_an_acceleration_costs_what_the_closed_form_says(gai
 
 
 def response_to_one_frame(tracker: dict[str, Any]) -> np.ndarray:
-    """What the tracker makes of a target that jumps by 1, frame by frame: the sum of its responses to single frames."""
+    """The estimate of a target that jumps by 1, frame by frame: the sum of the responses to single frames."""
     found, _ = expected(scenario({"steps": [{"height": 1.0, "time": 0.1 - 0.4 * T}]}, {}, tracker, duration=4.0))
     return np.diff(found[:-1])
 

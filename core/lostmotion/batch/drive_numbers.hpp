@@ -9,11 +9,7 @@
 namespace lostmotion::batch {
 
 inline constexpr double ROUNDING = 0x1p-52;
-struct Lane {
-    using number = real;
-    using mask = bool;
-    static bool any(bool on) { return on; }
-};
+#include "drive_lane.hpp"
 #include "drive_series.hpp"
 #include "drive_walk.hpp"
 

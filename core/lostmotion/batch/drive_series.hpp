@@ -1,9 +1,10 @@
 // The motion of a drive within a regime, as the Taylor series of its four states; of one drive or of several at once.
 //
-// The text of this file is plain, as that of `drive_walk.hpp`. Where it is included, `real` is the type of its numbers,
-// of one drive or of a lane for each of several, and `ROUNDING` their rounding. `Lane` has the type `number` of what
-// all drives share, the type `mask` of a comparison, and `any`, whether one of a mask is true. A lane has the same bits
-// whatever the others do.
+// The text of this file is plain, as that of `drive_walk.hpp`. Where it is included, `real` is the type of its numbers:
+// a number of one drive, or a vector with a lane for each of several drives. `ROUNDING` is the rounding of a number.
+// `Lane`, for one drive that of `drive_lane.hpp`, has the type `number` of what all drives share, the type `mask` of a
+// comparison, and `any`, which tells whether a comparison holds in any lane. A lane has the same bits whatever the
+// others do.
 
 struct Magnitudes {
     static real magnitude(real v) { return v < 0 ? -v : v; }

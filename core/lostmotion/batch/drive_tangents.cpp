@@ -33,12 +33,8 @@ struct real {
     friend auto operator<=>(real a, real b) { return a.value <=> b.value; }
 };
 
-struct Lane {
-    using number = real;
-    using mask = bool;
-    static bool any(bool on) { return on; }
-};
 #include "../parts/loss_grid.hpp"
+#include "drive_lane.hpp"
 #include "drive_series.hpp"
 #include "drive_walk.hpp"
 

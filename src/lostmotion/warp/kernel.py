@@ -43,7 +43,7 @@ LISTS = ("lower", "upper", "slope", "offset", "root", "reach", "inverse", "speed
 NUMBERS = ("half_gap", "steepest")
 WHOLE = ("pieces", "zero", "losses", "n_speeds", "n_loads", "most_degree")
 FLAGS = ("has_gap", "rigid", "delays_torque", "limits_damping", "torque_source")
-CORE = "loss_grid.hpp", "drive_series.hpp", "drive_walk.hpp"
+CORE = "loss_grid.hpp", "drive_lane.hpp", "drive_series.hpp", "drive_walk.hpp"
 DEGREE = {"float32": 14, "float64": 23}
 NUMBER = {"float32": wp.float32, "float64": wp.float64}
 LIMIT = 1e30  # in place of infinity, which single precision has, too, but compilers may assume away
@@ -54,11 +54,6 @@ MOST_ARMATURE = 1e4  # what an engine is told of a joint that friction holds, ov
 START = """
     typedef {real} real;
     constexpr real ROUNDING = real({epsilon});
-    struct Lane {{
-        typedef real number;
-        typedef bool mask;
-        static bool any(bool on) {{ return on; }}
-    }};
     {text}
     const int n = drives.count;
     DriveLaws laws;
