@@ -35,7 +35,8 @@ from lostmotion.model import signals
 from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.simulation.forms.train_tables import train_schema
 from lostmotion.simulation.variables import VARIABLES
-from lostmotion.units.grammar import PREFIXED, SPELLINGS
+from lostmotion.units.grammar import PREFIXED
+from lostmotion.units.unit_table import UNITS
 
 OUT = Path(__file__).parent / "reference"
 IMAGES = Path(__file__).parent / "images"
@@ -181,7 +182,7 @@ def changes() -> list[str]:
 def units() -> list[str]:
     """What a string may hold, with the units of the closed list."""
     rows = [f"| `{symbol}` | {', '.join(f'`{p}{symbol}`' for p in p.split())} |" for symbol, (_, p) in PREFIXED.items()]
-    others = [" ".join(f"`{s}`" for s in spellings.split()) for spellings in SPELLINGS.values()]
+    others = [" ".join(f"`{s}`" for s in spellings.split()) for _, _, spellings in UNITS.values() if spellings]
     return [
         "## Numbers and units",
         "",

@@ -18,9 +18,9 @@ from lostmotion.data_sheets.records import parse_sheets
 from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 from lostmotion.simulation.scenario.units_of_keys import unit_of_key
 from lostmotion.units.conversion import si_factor, to_si
-from lostmotion.units.grammar import PREFIXED, angle_of, plain, read_unit, symbols, written
+from lostmotion.units.grammar import PREFIXED, plain, read_unit, symbols, written
 from lostmotion.units.practical import practical
-from lostmotion.units.unit_table import PREFIXES, UNITS, dimension_of, factor_of
+from lostmotion.units.unit_table import PREFIXES, UNITS, angle_of, dimension_of, factor_of
 
 RPM = 2.0 * math.pi / 60.0
 DEG = math.pi / 180.0
@@ -320,7 +320,7 @@ def in_pint(units: Mapping[str, int]) -> pint.Quantity:
 
 
 def test_every_unit_has_the_factor_and_the_dimension_of_pint():
-    prefixed = {prefix + name for prefix in PREFIXES for name, _ in PREFIXED.values()}
+    prefixed = {prefix + name for prefix, _ in PREFIXES.values() for name, _ in PREFIXED.values()}
     for name in {*UNITS, *prefixed, *(name for units in symbols().values() for name in units)}:
         expected = in_pint({name: 1}).to_base_units()
         assert factor_of({name: 1}) == expected.magnitude, name

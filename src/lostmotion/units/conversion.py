@@ -15,9 +15,9 @@ from decimal import Decimal
 from functools import lru_cache
 from typing import TYPE_CHECKING, Any
 
-from .grammar import FORCE_OF, Product, UnknownUnitError, angle_of, near, plain, read_unit, written
+from .grammar import FORCE_OF, Product, UnknownUnitError, near, plain, read_unit, written
 from .scalars import is_number, objection, scalar
-from .unit_table import dimension_of, factor_of
+from .unit_table import angle_of, dimension_of, factor_of
 
 if TYPE_CHECKING:
     from pydantic import GetCoreSchemaHandler, GetJsonSchemaHandler

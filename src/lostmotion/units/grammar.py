@@ -6,19 +6,10 @@ import unicodedata
 from functools import cache
 from itertools import product as pairs
 
+from .unit_table import PREFIXES, UNITS
+
 Product = dict[str, int]  # unit of the table: its power
 
-PREFIXES = {
-    "n": "nano",
-    "u": "micro",
-    "m": "milli",
-    "c": "centi",
-    "d": "deci",
-    "da": "deca",
-    "k": "kilo",
-    "M": "mega",
-    "G": "giga",
-}
 # Symbol: unit of the table, and the prefixes that are in use with it.
 PREFIXED = {
     "N": ("newton", "u m c d da k M"),
@@ -38,48 +29,6 @@ PREFIXED = {
     "St": ("stokes", "c"),
     "rev": ("revolution", "k"),
 }
-# Other spellings of a unit of the table; the first is the one that messages show.
-SPELLINGS = {
-    "newton": "newton newtons",
-    "pascal": "pascal pascals",
-    "meter": "meter metre meters metres",
-    "second": "sec second seconds",
-    "minute": "min minute minutes",
-    "hour": "h hr hour hours",
-    "day": "d day days",
-    "radian": "radian radians",
-    "degree": "deg ° degree degrees",
-    "arcminute": "arcmin ' arcmins arcminute arcminutes",
-    "arcsecond": 'arcsec " arcsecs arcsecond arcseconds',
-    "milliarcsecond": "mas",
-    "gon": "gon",
-    "revolution": "r turn turns revs revolution revolutions U tr",
-    "hertz": "hertz",
-    "volt": "volt volts",
-    "ampere": "amp amps ampere amperes",
-    "ohm": "ohms",
-    "farad": "farad farads",  # F alone is a temperature
-    "millifarad": "mF",
-    "microfarad": "uF",
-    "kelvin": "kelvin",
-    "degree_Celsius": "degC °C C celsius",
-    "degree_Fahrenheit": "degF °F F fahrenheit",
-    "watt": "watt watts",
-    "percent": "% percent",
-    "permille": "‰",
-    "ppm": "ppm",
-    "inch": "in inch inches",
-    "foot": "ft foot feet",
-    "pound": "lb lbs pound pounds",
-    "avoirdupois_pound": "lbm",  # a mass and nothing else
-    "force_pound": "lbf",
-    "ounce": "oz ounce ounces",
-    "force_ounce": "ozf",
-    "slug": "slug slugs",
-    "kilogram_force": "kgf kp",
-    "force_gram": "gf",
-}
-ANGLES = {"radian", "degree", "arcminute", "arcsecond", "milliarcsecond", "gon", "revolution"}
 # How a mass is read where only a force gives the quantity: (mass, force) of the table.
 FORCE_OF = {"pound": "force_pound", "ounce": "force_ounce", "kilogram": "kilogram_force", "gram": "force_gram"}
 
@@ -122,8 +71,8 @@ def symbols() -> dict[str, Product]:
     found: dict[str, Product] = {}
     for symbol, (name, prefixes) in PREFIXED.items():
         found[symbol] = {name: 1}
-        found |= {p + symbol: {PREFIXES[p] + name: 1} for p in prefixes.split()}
-    for name, spellings in SPELLINGS.items():
+        found |= {p + symbol: {PREFIXES[p][0] + name: 1} for p in prefixes.split()}
+    for name, (_, _, spellings) in UNITS.items():
         found |= {spelling: {name: 1} for spelling in spellings.split()}
     found |= {"rpm": {"revolution": 1, "minute": -1}, "krpm": {"kilorevolution": 1, "minute": -1}}
     found |= {"rps": {"revolution": 1, "second": -1}}
@@ -234,12 +183,3 @@ def written(units: Product) -> str:
 
     over = "".join("/" + symbol for symbol in powers(-1))
     return ("*".join(powers(1)) or "1") + over
-
-
-def angle_of(units: Product) -> int:
-    """The power of the plane angle, whose dimension is the dimension of a plain number."""
-    return sum(power for name, power in units.items() if _without_prefix(name) in ANGLES)
-
-
-def _without_prefix(name: str) -> str:
-    return next((name.removeprefix(p) for p in PREFIXES.values() if name.removeprefix(p) in ANGLES), name)
