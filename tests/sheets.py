@@ -6,7 +6,7 @@ from pathlib import Path
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.data_sheets.gearbox_sheet import GearboxSheet
-from lostmotion.data_sheets.loss_map_builder import build_loss_map
+from lostmotion.data_sheets.loss_map_from_data_sheet import build_loss_map
 from lostmotion.data_sheets.motor_sheet import MotorSheet
 from lostmotion.data_sheets.records import catalogue
 

@@ -18,7 +18,7 @@ from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.nearest_misses import not_judged
 from lostmotion.studies.selection.ranking import RankedCandidate
 from lostmotion.studies.selection.task_file import task_of
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 from refusals import refused
 
 ARM: dict[str, Any] = {

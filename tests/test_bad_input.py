@@ -14,7 +14,7 @@ from hypothesis import strategies as st
 
 import lostmotion as lm
 from conftest import ROOT, lostmotion
-from lostmotion.inputs.validation import listed, nearest
+from lostmotion.inputs.refusal_messages import listed, nearest
 from lostmotion.simulation.scenario.scenario import Scenario
 from lostmotion.studies.expressions.expressions import Expression
 from lostmotion.studies.expressions.vocabulary import vocabulary_of

@@ -18,7 +18,7 @@ from lostmotion.cli import app
 from lostmotion.data_sheets import records
 from lostmotion.data_sheets.components import motor_table
 from lostmotion.data_sheets.loss_data import Lubricant
-from lostmotion.data_sheets.loss_map_builder import build_loss_map
+from lostmotion.data_sheets.loss_map_from_data_sheet import build_loss_map
 from lostmotion.data_sheets.records import KINDS, catalogue, find, parse_sheets
 from lostmotion.errors import InputError
 from lostmotion.inputs.toml_text import toml_text

@@ -13,7 +13,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import SCENARIOS, TRAINS
-from lostmotion.inputs.validation import shown
+from lostmotion.inputs.refusal_messages import shown
 from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.initial_state import start_values
 from lostmotion.simulation.forms.key_aliases import DRIVE

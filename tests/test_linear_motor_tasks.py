@@ -11,7 +11,7 @@ from conftest import ROOT
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.task_file import task_of
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 from refusals import refused
 
 SCALE = {"grating_period": "20 um", "bits": 10}

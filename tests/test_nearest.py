@@ -24,7 +24,7 @@ from lostmotion.studies.selection.ranking import candidates, prices
 from lostmotion.studies.selection.task_file import load_task, task_of
 from lostmotion.studies.study.drive_check_columns import UNSTABLE
 from lostmotion.studies.study.records_that_vary import names_that_fit
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 from test_axis_tasks import ARM, GEARBOX, MOTOR, SLIDE
 from test_select import TABLES
 from test_task_keys import FORMS

@@ -17,7 +17,7 @@ from lostmotion.studies.selection.ranking import candidates, pareto_front
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.drive_check_columns import ESTIMATED
 from lostmotion.studies.study.records_that_vary import names_of, names_that_fit
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 from refusals import refused
 from test_select import ACCELERATION, FRICTION, TABLES, J
 

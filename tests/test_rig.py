@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from lostmotion.cli import app
 from lostmotion.data_sheets.components import gearbox_table
-from lostmotion.data_sheets.loss_map_builder import build_loss_map
+from lostmotion.data_sheets.loss_map_from_data_sheet import build_loss_map
 from lostmotion.data_sheets.records import catalogue, find
 from lostmotion.model.losses import efficiency_map
 from lostmotion.simulation.scenario.scenario_files import screw_from_record

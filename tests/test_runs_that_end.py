@@ -14,7 +14,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, some
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 
 NAMED = {path.stem: path for path in ALL_SCENARIOS}
 FOR_EVER = {"simulation.duration": 1e7, "simulation.sample_interval": 1e4}

@@ -23,7 +23,7 @@ from lostmotion.sizing.axis_task.motor_per_sample_time import Electrical
 from lostmotion.sizing.duty_cycle import DutyCycle
 from lostmotion.sizing.required_motion import check_motor, input_demand, required_motion
 from lostmotion.studies.selection.task_file import task_of
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 from refusals import refused
 
 J, FRICTION, RATIO, CYCLE = 0.1, 0.5, 50.0, 1.0

@@ -32,7 +32,7 @@ from lostmotion.studies.runs import chunk as study_chunk
 from lostmotion.studies.runs.chunk import pieces, run_piece, scenario_of_run
 from lostmotion.studies.runs.runs_in_core import core_can
 from lostmotion.studies.study.random_designs import CHUNK
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 from lostmotion.studies.study.vary import Vary
 from refusals import refused
 

@@ -11,7 +11,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.sizing.thermal import rms
 from lostmotion.studies.runs.axis_pairs import Axes
-from lostmotion.studies.study.study import Study
+from lostmotion.studies.study.study_definition import Study
 
 TASKS = ROOT / "examples" / "tasks"
 G, DEG = 9.80665, math.pi / 180.0

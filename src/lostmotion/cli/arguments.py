@@ -35,7 +35,7 @@ def number(unit: str = "", option: str = "") -> Callable[[str], float]:
     """Reads the value of an option: a bare number in `unit`, which is printed back, or one with a unit, as in a scenario."""
 
     def read(text: str) -> float:
-        from ..inputs.validation import shown
+        from ..inputs.refusal_messages import shown
         from ..units.conversion import si_value
 
         try:

@@ -4,7 +4,7 @@ import itertools
 import re
 
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..units.conversion import si_value
 
 MOST = 100_000  # values of a range

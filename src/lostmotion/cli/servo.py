@@ -251,7 +251,7 @@ def _tuned(scenario: Scenario, rule: str, motor: str | None, wanted: Mapping[str
 def _settled(scenario: Scenario, motor: str | None, window: str) -> float:
     """The window in SI: an angle, or of a slide a distance."""
     from ..errors import InputError
-    from ..inputs.validation import shown
+    from ..inputs.refusal_messages import shown
     from ..servo.linear_regimes import axis_of
     from ..units.conversion import si_value
 

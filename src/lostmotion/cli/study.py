@@ -13,7 +13,7 @@ from .terminal import busy, conclude, fail, progress
 from .workers import workers
 
 if TYPE_CHECKING:
-    from ..studies.study.study import Study
+    from ..studies.study.study_definition import Study
 
 
 OutputOption = Annotated[

@@ -11,7 +11,7 @@ from typing import Any
 from .. import _core
 from ..errors import InputError, inside
 from ..inputs.core_parameters import Described, ReferenceBlocks
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.motor import Motor, MotorLaw
 from ..model.shaft_ratio import turns
 from ..model.signals import columns

@@ -26,7 +26,7 @@ from ..inputs.quantities import (
     Torque,
     ViscousFriction,
 )
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.motor import Motor
 from ..model.shaft_ratio import turns
 from ..model.signals import Signal, Step

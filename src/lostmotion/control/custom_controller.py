@@ -10,7 +10,7 @@ from typing import Any
 from .. import _core
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 
 C_FUNCTION: Any = ctypes.CFUNCTYPE(None).__mro__[1]  # the class of all function pointers
 SIGNATURE = (

@@ -25,7 +25,7 @@ from ..inputs.quantities import (
     Time,
     Torque,
 )
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..model.signals import Breakpoint, Samples, TimeFunction, taylor
 from ..recorded_numbers import real
 from ..reproducible import cbrt, cos, cubic_spline, sin, sqrt

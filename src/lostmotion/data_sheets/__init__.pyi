@@ -7,7 +7,7 @@ from .linear_sheets import LinearMotorSheet as LinearMotorSheet
 from .linear_sheets import RackSheet as RackSheet
 from .linear_sheets import ScrewSheet as ScrewSheet
 from .loss_data import Lubricant as Lubricant
-from .loss_map_builder import BuiltMap as BuiltMap
-from .loss_map_builder import build_loss_map as build_loss_map
+from .loss_map_from_data_sheet import BuiltMap as BuiltMap
+from .loss_map_from_data_sheet import build_loss_map as build_loss_map
 from .motor_sheet import MotorSheet as MotorSheet
 from .sheet import Source as Source

@@ -12,9 +12,9 @@ from ..inputs.arguments import RecordName, checked
 from ..inputs.implausible_values import doubt
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Inertia, NotNegative, Number, Positive, Temperature, argument
+from ..inputs.refusal_messages import shortened, shown, unknown_key
 from ..inputs.schema import keys_within
 from ..inputs.toml_files import is_in_file
-from ..inputs.validation import shortened, shown, unknown_key
 from ..model.gearbox import Gearbox
 from ..model.motor import DC_KEYS, Motor
 from ..model.notes import Noted, Notes, together
@@ -23,7 +23,7 @@ from ..model.torsion import LinearStiffness, TorsionCurve
 if TYPE_CHECKING:
     from .actuator_sheet import ActuatorSheet
     from .gearbox_sheet import GearboxSheet
-    from .loss_map_builder import BuiltMap
+    from .loss_map_from_data_sheet import BuiltMap
     from .motor_sheet import MotorSheet
 
 S = TypeVar("S", bound="GearboxSheet | MotorSheet | ActuatorSheet")
@@ -68,7 +68,7 @@ def _table_of_sheet(
     record: GearboxSheet, name: str, changes: Mapping[str, Any], where: str
 ) -> tuple[dict[str, Any], BuiltMap | None]:
     from .gearbox_sheet import SCALARS
-    from .loss_map_builder import build_loss_map
+    from .loss_map_from_data_sheet import build_loss_map
 
     scalars = {key: value for key, value in changes.items() if key in SCALARS}
     try:

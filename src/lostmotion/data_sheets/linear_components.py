@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 from ..errors import InputError, inside
 from ..inputs.part import Part
 from ..inputs.quantities import Force, Positive
-from ..inputs.validation import shortened, shown, unknown_key
+from ..inputs.refusal_messages import shortened, shown, unknown_key
 from ..model.notes import Noted
 from ..reproducible import cbrt
 

@@ -12,8 +12,8 @@ from typing import Any, TypeAlias, get_args
 
 from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
+from ..inputs.refusal_messages import names_like, shown, unknown_key
 from ..inputs.toml_files import is_in_file, read_toml
-from ..inputs.validation import names_like, shown, unknown_key
 from .accessory_sheets import AmplifierSheet, BrakeSheet
 from .actuator_sheet import ActuatorSheet
 from .gearbox_sheet import GearboxSheet

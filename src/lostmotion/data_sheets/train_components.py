@@ -5,7 +5,7 @@ from typing import Any
 
 from ..errors import InputError
 from ..inputs.part import Part
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor, ShaftMotor

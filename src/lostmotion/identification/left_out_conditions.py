@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError
-from ..inputs.validation import shortened
+from ..inputs.refusal_messages import shortened
 from ..units.practical import counted
 from .candidate_models import mean_errors, with_own
 from .fit.least_squares import Fit, problem_of, search

@@ -12,7 +12,7 @@ from ..units.conversion import Unit
 from ..units.scalars import is_number, is_several, objection, scalar
 from . import quantities
 from .quantities import argument
-from .validation import did_you_mean, shown
+from .refusal_messages import did_you_mean, shown
 
 P = ParamSpec("P")
 R = TypeVar("R")

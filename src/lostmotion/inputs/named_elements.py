@@ -7,7 +7,7 @@ from typing import Annotated, Any, NoReturn, TypeVar
 from pydantic import AfterValidator
 
 from ..errors import InputError
-from .validation import shown
+from .refusal_messages import shown
 
 V = TypeVar("V")
 

@@ -15,7 +15,7 @@ from ..units.scalars import plain
 from .display import abridged
 from .docstrings import docstring_of
 from .parameters import PartType, written_docstring
-from .validation import refusal, shown
+from .refusal_messages import refusal, shown
 
 
 class Part(BaseModel, metaclass=PartType):

@@ -10,7 +10,7 @@ from pydantic_core import CoreSchema
 from ..errors import InputError
 from ..units.conversion import Unit
 from ..units.scalars import is_several
-from .validation import shown
+from .refusal_messages import shown
 
 Count = Annotated[int, "above 0"]  # a whole number above 0, as the core takes it
 Number = Annotated[float, Unit("")]

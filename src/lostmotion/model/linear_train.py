@@ -7,7 +7,7 @@ from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.named_elements import Elements, Named, nothing
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..recorded_numbers import may_differ
 from .gear import Gear
 from .linear import LinearDrive, Screw

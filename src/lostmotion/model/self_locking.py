@@ -13,7 +13,7 @@ from .. import _core
 from ..errors import InputError, prefixed
 from ..inputs.arguments import checked
 from ..inputs.quantities import Speed, Torque
-from ..inputs.validation import did_you_mean
+from ..inputs.refusal_messages import did_you_mean
 from .gear import Gear
 from .gearbox import Gearbox
 from .shaft_ratio import joints_of, tied

@@ -9,7 +9,7 @@ import numpy as np
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from .motor import Motor
 
 ELECTRIC = ("rated_current", "resistance_phase", "inductance_phase", "supply_voltage")

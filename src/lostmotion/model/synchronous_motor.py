@@ -34,7 +34,7 @@ from ..inputs.quantities import (
     VoltageConstant,
     Whole,
 )
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..units.conversion import Unit
 
 AGREEMENT = 0.05  # between constants that say the same; beyond it one of them is misread

@@ -9,7 +9,7 @@ from .. import _core
 from ..errors import InputError
 from ..inputs.named_elements import Elements, nothing
 from ..inputs.part import Part
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from .angle_torques import AngleTorque, Gravity
 from .couplings import BetweenShafts, Brake, Clutch, Commanded, Freewheel, Ratchet, TorqueLimiter
 from .dampers import Damper

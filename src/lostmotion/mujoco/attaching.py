@@ -13,7 +13,7 @@ from ..data_sheets.components import actuator, gearbox
 from ..data_sheets.records import catalogue
 from ..errors import InputError, need, prefixed
 from ..inputs.arguments import checked
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.load import Load
 from ..model.motor import Motor

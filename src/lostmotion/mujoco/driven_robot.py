@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.validation import did_you_mean, listed, shown
+from ..inputs.refusal_messages import did_you_mean, listed, shown
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import JointDrive, JointTrains, joint_drive
 from .joints import acts, is_slide, joint_id, mass_matrix

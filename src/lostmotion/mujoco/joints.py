@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.validation import did_you_mean, listed, shown
+from ..inputs.refusal_messages import did_you_mean, listed, shown
 
 if TYPE_CHECKING:
     import mujoco

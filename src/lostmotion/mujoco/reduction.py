@@ -11,7 +11,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.named_elements import Named
 from ..inputs.quantities import Frequency, argument
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..model.drive import Drive
 from ..model.motor import ShaftMotor
 from ..model.train import DriveTrain

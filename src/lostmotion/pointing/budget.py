@@ -14,7 +14,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.shaft_ratio import turns
 from ..response.spectrum import Spectrum, spectrum
 from ..simulation.runs.lost_steps import LostSteps, found_in

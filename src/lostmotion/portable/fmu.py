@@ -19,7 +19,7 @@ from ..atomic_writer import write_whole
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.train import DriveTrain
 from ..simulation.runs.results import variables_of
 from ..simulation.runs.run import run

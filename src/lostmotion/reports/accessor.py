@@ -8,7 +8,7 @@ import xarray as xr
 
 from ..errors import InputError
 from ..inputs.arguments import checked
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..response.harmonic import of_output
 from ..simulation.runs.results import energy_of, scenario_of, whole
 from ..simulation.scenario.scenario import Scenario

@@ -17,8 +17,8 @@ from ..data_sheets.linear_sheets import BeltSheet, LinearMotorSheet, LinearSheet
 from ..data_sheets.motor_sheet import MotorSheet
 from ..data_sheets.records import KINDS, Sheet, catalogue, find, read_sheets, table_of
 from ..errors import InputError
+from ..inputs.refusal_messages import did_you_mean, names_like
 from ..inputs.toml_files import is_in_file
-from ..inputs.validation import did_you_mean, names_like
 from ..units.conversion import si_value
 from ..units.practical import RPM
 from .sheet_rows import rows_of

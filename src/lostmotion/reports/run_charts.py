@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..live_page.scenario_drawing import axis_figures
 from ..model.end_stops import END_STOP
 from ..model.losses import LossMap

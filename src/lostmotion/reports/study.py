@@ -11,7 +11,7 @@ import numpy as np
 from ..errors import InputError, need
 from ..studies.runs.read_table import labelled, read_table
 from ..studies.runs.run_study import study_of
-from ..studies.study.study import Study
+from ..studies.study.study_definition import Study
 from ..studies.study.vary import Vary
 from ..units.practical import counted, printed
 from ..verdict import Verdict

@@ -15,7 +15,7 @@ from ..studies.selection.nearest_misses import Lacking, Miss, misses, not_judged
 from ..studies.selection.ranking import NOT_RUN, Price, RankedCandidate, candidates, pareto_front, prices
 from ..studies.study.drive_check_columns import ESTIMATED, NO_DATA
 from ..studies.study.select_table import TASK_SHARES, USE, Selection
-from ..studies.study.study import Study
+from ..studies.study.study_definition import Study
 from ..units.practical import PRACTICAL, counted, printed
 from ..verdict import Point, Verdict
 from .looks import OTHERS, PALETTE, look

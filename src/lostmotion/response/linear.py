@@ -12,7 +12,7 @@ from .. import _core
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time, Torque, argument, arguments
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.signals import core_signal
 from ..model.torsion import Rigid

@@ -12,7 +12,7 @@ from .. import _core
 from ..control.command import CommandSignal, CurrentLevel, FieldAngle
 from ..control.controller import AnyReference
 from ..errors import InputError
-from ..inputs.validation import listed, shown
+from ..inputs.refusal_messages import listed, shown
 from ..model.drive import Drive
 from ..model.signals import Signal
 from ..model.train import DriveTrain

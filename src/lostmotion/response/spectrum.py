@@ -13,7 +13,7 @@ from ..control.references import PositionReference, SlideReference
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number, Time
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.angle_torques import AngleCurve, Harmonic, PositionHarmonic
 from ..model.shaft_ratio import turns
 from ..model.train import DriveTrain

@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.implausible_values import doubt_window
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_value
 from ..units.practical import practical

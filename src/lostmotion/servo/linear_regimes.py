@@ -13,7 +13,7 @@ from .. import _core
 from ..control.axis import core_control
 from ..control.controller import Controller
 from ..errors import InputError, need
-from ..inputs.validation import chosen_motor
+from ..inputs.refusal_messages import chosen_motor
 from ..model.gear import Gear
 from ..model.shaft_ratio import tied, turns
 from ..model.signals import ForceSignal, TorqueSignal, core_signal

@@ -24,7 +24,7 @@ from ..control.gain_rules import (
 from ..errors import InputError, need
 from ..inputs.arguments import ScenarioName, checked
 from ..inputs.quantities import Angle, Frequency, Number
-from ..inputs.validation import did_you_mean, shown
+from ..inputs.refusal_messages import did_you_mean, shown
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import counted
 from .axis_runs import with_controller

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal, Self, get_args
 
 from ..errors import InputError
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..units.practical import ROUNDING, counted, excess, told_apart
 from ..verdict import Point, Verdict
 from .duty_cycle import DutyCycle

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Temperature
-from ..inputs.validation import chosen_motor
+from ..inputs.refusal_messages import chosen_motor
 from ..model.motor import ShaftMotor
 from ..simulation.runs.results import RunArrays, scenario_of
 from ..simulation.scenario.scenario import Scenario

@@ -13,7 +13,7 @@ from ..control.command import CommandSignal, Stepping
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.named_elements import Named
-from ..inputs.validation import chosen_motor, shown
+from ..inputs.refusal_messages import chosen_motor, shown
 from ..model.motor import ShaftMotor
 from ..model.shaft_ratio import turns
 from ..model.signals import TorqueSignal

@@ -11,7 +11,7 @@ from ..control.references import MovesReference
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Number
-from ..inputs.validation import chosen_motor
+from ..inputs.refusal_messages import chosen_motor
 from ..model.shaft_ratio import turns
 from ..model.torsion import Rigid
 from ..simulation.runs.lost_steps import LostSteps, found_in

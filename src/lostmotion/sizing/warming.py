@@ -17,12 +17,12 @@ import numpy as np
 
 from .. import _core
 from ..data_sheets.loss_data import Lubricant
-from ..data_sheets.loss_map_builder import VISCOSITY_EXPONENT
+from ..data_sheets.loss_map_from_data_sheet import VISCOSITY_EXPONENT
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.implausible_values import trusted
 from ..inputs.quantities import Number, Temperature, Time
-from ..inputs.validation import chosen_motor, did_you_mean
+from ..inputs.refusal_messages import chosen_motor, did_you_mean
 from ..model.gearbox import Transmission
 from ..model.losses import LossMap
 from ..model.motor import Motor

@@ -17,7 +17,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.limits import check_free
 from ..inputs.quantities import Count, Number, Speed, Torque
-from ..inputs.validation import shown
+from ..inputs.refusal_messages import shown
 from ..model.drive import Drive
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox

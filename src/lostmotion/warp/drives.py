@@ -12,7 +12,7 @@ from ..control.axis import OPEN_LOOP
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count, Time
-from ..inputs.validation import listed, shown
+from ..inputs.refusal_messages import listed, shown
 from ..model.drive import Drive
 from ..model.train import DriveTrain
 from ..simulation.batches.batch_parameters import mask_of_drives, numbers_of_drives, varied_columns

@@ -10,7 +10,7 @@ import numpy as np
 from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..inputs.quantities import Count
-from ..inputs.validation import listed, shown
+from ..inputs.refusal_messages import listed, shown
 from ..mujoco.attaching import alone_on_joint
 from ..mujoco.joints import compiled, mass_matrix
 from ..simulation.batches.batch_parameters import mask_of_drives

@@ -15,7 +15,7 @@ import numpy as np
 
 from ...errors import InputError, visible
 from ...inputs.arguments import checked
-from ...inputs.validation import listed
+from ...inputs.refusal_messages import listed
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load
 from ...units.practical import counted

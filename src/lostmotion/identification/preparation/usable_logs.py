@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...inputs.validation import did_you_mean
+from ...inputs.refusal_messages import did_you_mean
 from ..prepared_log import Prepared
 from ..readers.log_files import find_logs, read_log
 from ..rig.measurement_model import numbers_of

@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.validation import MAX_LISTED, did_you_mean, shortened
+from ...inputs.refusal_messages import MAX_LISTED, did_you_mean, shortened
 
 
 def reason(error: Exception) -> str:

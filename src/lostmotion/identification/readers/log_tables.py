@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.validation import did_you_mean, shortened
+from ...inputs.refusal_messages import did_you_mean, shortened
 from .channel_units import is_unit
 from .log import Channel, Log
 

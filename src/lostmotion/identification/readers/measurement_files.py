@@ -14,7 +14,7 @@ import numpy as np
 from ...errors import InputError, need
 from ...inputs.hdf5_files import datasets
 from ...inputs.limits import check_memory, memory_limit
-from ...inputs.validation import did_you_mean, listed
+from ...inputs.refusal_messages import did_you_mean, listed
 from .channel_conversions import conversion_of
 from .log import Channel, Log, as_number, as_refusal, quiet_ends, reason, warnings_of
 from .log_tables import TIME_NAMES

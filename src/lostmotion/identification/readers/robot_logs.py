@@ -13,7 +13,7 @@ import numpy as np
 
 from ...errors import InputError, need
 from ...inputs.limits import check_memory, memory_limit
-from ...inputs.validation import listed
+from ...inputs.refusal_messages import listed
 from .log import Channel, Log, as_number, as_refusal, reason
 
 Course = tuple[np.ndarray, np.ndarray]  # times of the messages [ns] and values

@@ -11,7 +11,7 @@ from xml.parsers import expat
 
 from ...errors import InputError, need
 from ...inputs.limits import check_memory
-from ...inputs.validation import listed
+from ...inputs.refusal_messages import listed
 from ...inputs.zip_files import members
 from .irregular_tables import odd_table_log
 from .log import Log, as_refusal

@@ -8,7 +8,7 @@ from typing import Any
 
 from ...errors import InputError
 from ...inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
-from ...inputs.validation import MAX_LISTED, did_you_mean, shortened, shown
+from ...inputs.refusal_messages import MAX_LISTED, did_you_mean, shortened, shown
 
 Functions = Mapping[str, Callable[..., Any]]
 FUNCTIONS: Functions = {

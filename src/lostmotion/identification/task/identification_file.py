@@ -14,8 +14,8 @@ from ...inputs.arguments import checked
 from ...inputs.named_elements import Elements, nothing
 from ...inputs.part import Part
 from ...inputs.quantities import NotNegative, Number, Positive, Switch, Time, Whole
+from ...inputs.refusal_messages import did_you_mean
 from ...inputs.toml_files import read_toml
-from ...inputs.validation import did_you_mean
 from .file_formulas import CONSTANTS, FUNCTIONS, Formula
 from .free_parameters import FreeParameter, in_unit
 from .monitor_table import Monitoring

@@ -12,7 +12,7 @@ import numpy as np
 from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.quantities import argument
-from ...inputs.validation import shown
+from ...inputs.refusal_messages import shown
 from ...simulation.scenario.scenario import Scenario
 from ..linear_regimes import Axis, axis_of
 from .break_away_map import Image, Transients, image

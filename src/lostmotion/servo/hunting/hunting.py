@@ -13,7 +13,7 @@ import numpy as np
 from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.quantities import Count
-from ...inputs.validation import shown
+from ...inputs.refusal_messages import shown
 from ...response.plant import known_output, plant_of
 from ...response.shooting import floquet_multipliers, is_stable, motion_of
 from ...simulation.scenario.scenario import Scenario

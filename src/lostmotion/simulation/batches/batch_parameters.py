@@ -7,7 +7,7 @@ import numpy as np
 
 from ...errors import InputError
 from ...inputs.implausible_values import trusted
-from ...inputs.validation import shown
+from ...inputs.refusal_messages import shown
 from ..runs.sensitivities import value_at
 from ..scenario.scenario import Scenario
 

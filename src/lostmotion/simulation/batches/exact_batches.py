@@ -8,7 +8,7 @@ import numpy as np
 from ... import _core
 from ...control.axis import OPEN_LOOP
 from ...errors import InputError
-from ...inputs.validation import did_you_mean, listed, shown
+from ...inputs.refusal_messages import did_you_mean, listed, shown
 from ..scenario.scenario import Scenario
 from .batch_parameters import BatchParameters
 

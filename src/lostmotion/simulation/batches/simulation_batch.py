@@ -14,7 +14,7 @@ from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.limits import check_free
 from ...inputs.quantities import Count, Time
-from ...inputs.validation import did_you_mean, listed, shown
+from ...inputs.refusal_messages import did_you_mean, listed, shown
 from ...model.drive import Drive
 from ...model.train import DriveTrain
 from ..forms.given_motion import check_motion

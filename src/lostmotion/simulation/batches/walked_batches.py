@@ -11,7 +11,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import InputError
-from ...inputs.validation import did_you_mean
+from ...inputs.refusal_messages import did_you_mean
 from ...model.torsion import Rigid, TorsionCurve
 from ..forms.dotted_keys import renamed
 from ..runs.sensitivities import SUFFIX

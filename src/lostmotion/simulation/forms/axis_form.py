@@ -6,7 +6,7 @@ from copy import deepcopy
 from typing import Any
 
 from ...errors import InputError
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...units.conversion import Unit
 from .common_tables import RECORD_NAME
 from .drive_tables import drive_schema

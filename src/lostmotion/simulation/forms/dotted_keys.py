@@ -9,8 +9,8 @@ from ...data_sheets.components import as_torque_source, at_voltage
 from ...data_sheets.train_components import RECORDS, without_record
 from ...errors import InputError
 from ...inputs.implausible_values import doubt
+from ...inputs.refusal_messages import shortened, shown
 from ...inputs.toml_files import MAX_LEVELS, shallow
-from ...inputs.validation import shortened, shown
 from ...model.notes import Noted
 from ...units.scalars import is_number, plain
 

@@ -8,7 +8,7 @@ from typing import Any
 from ...control.references import PositionReference, SlideReference
 from ...errors import InputError
 from ...inputs.quantities import Number, argument
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.signals import Breakpoint, Signal, taylor
 
 UNITS = {"angle": "rad", "speed": "rad/s", "acceleration": "rad/s^2"}

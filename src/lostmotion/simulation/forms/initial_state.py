@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 from ... import _core
 from ...errors import InputError
-from ...inputs.validation import did_you_mean
+from ...inputs.refusal_messages import did_you_mean
 from ...model.shaft_ratio import tied
 from ...model.signals import Signal
 from ...model.torsion import Rigid

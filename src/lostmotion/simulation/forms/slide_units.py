@@ -5,8 +5,8 @@ from typing import Any
 
 from ...errors import InputError
 from ...inputs.quantities import argument
+from ...inputs.refusal_messages import shown
 from ...inputs.schema import follow, unit_in_schema
-from ...inputs.validation import shown
 from ...units.conversion import Unit
 
 # Keys of a controller that belong to the shaft of its reference, and keys that belong to the shafts of its encoders.

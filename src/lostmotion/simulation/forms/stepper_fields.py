@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...control.command import CommandSignal, CurrentLevel, FieldAngle, Stepping
 from ...inputs.quantities import Number
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.shaft_ratio import turns
 from ...model.signals import Signal
 from .initial_state import angles_at_start

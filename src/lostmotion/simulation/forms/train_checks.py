@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING
 
 from ...control.axis import check_torques
 from ...errors import InputError
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ..variables_of_trains import check_names
 from .common_tables import Whole
 from .given_motion import check_continuous

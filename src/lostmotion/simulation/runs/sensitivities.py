@@ -17,7 +17,7 @@ from ... import _core
 from ...control.axis import BoundController
 from ...errors import InputError
 from ...inputs.implausible_values import trusted
-from ...inputs.validation import shortened, shown
+from ...inputs.refusal_messages import shortened, shown
 from ..forms.dotted_keys import list_index
 from ..scenario.key_suggestions import near_key
 from ..scenario.requirements import need_free_motion

@@ -4,7 +4,7 @@ import difflib
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ...inputs.validation import nearest
+from ...inputs.refusal_messages import nearest
 from .scenario import Scenario
 
 

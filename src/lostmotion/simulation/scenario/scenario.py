@@ -21,7 +21,7 @@ from ...errors import InputError
 from ...inputs.cached_values import kept, kept_while_used
 from ...inputs.implausible_values import doubt_all
 from ...inputs.named_elements import Named
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.drive import Drive, DriveOfOneGear
 from ...model.gear import Gear
 from ...model.gearbox import Gearbox

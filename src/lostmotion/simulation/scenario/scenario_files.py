@@ -12,10 +12,10 @@ from ...data_sheets.records import find
 from ...data_sheets.train_components import RECORDS, without_record
 from ...errors import InputError, prefixed
 from ...inputs.implausible_values import doubt_all
+from ...inputs.refusal_messages import names_like, shortened, shown
 from ...inputs.schema import follow, unit_in_schema
 from ...inputs.toml_files import RESULTS, no_such_file, read_toml
 from ...inputs.toml_text import toml_text, without_empty
-from ...inputs.validation import names_like, shortened, shown
 from ...model.gearbox import Gearbox
 from ...model.linear import RatedScrew, ScrewData
 from ...model.notes import Noted, Notes

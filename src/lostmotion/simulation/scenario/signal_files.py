@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ...errors import InputError
 from ...inputs.limits import read_text
-from ...inputs.validation import shown
+from ...inputs.refusal_messages import shown
 from ...units.conversion import to_si
 from ...units.grammar import UnknownUnitError, plain, read_unit
 

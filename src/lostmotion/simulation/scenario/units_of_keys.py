@@ -5,8 +5,8 @@ from functools import cache
 from typing import Any
 
 from ...inputs.quantities import Limit
+from ...inputs.refusal_messages import shown
 from ...inputs.schema import follow, unit_in_schema
-from ...inputs.validation import shown
 from ...units.conversion import to_si
 from ...units.scalars import is_number, objection
 from ..forms.common_tables import ScenarioTables

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from ...errors import InputError
-from ...inputs.validation import did_you_mean, listed, shown
+from ...inputs.refusal_messages import did_you_mean, listed, shown
 from .step_inputs import GIVE, StepInput
 from .step_readings import SimulationReadings
 from .winding_error_bound import StepBound

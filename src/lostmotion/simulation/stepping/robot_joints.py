@@ -9,7 +9,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import InputError
-from ...inputs.validation import listed
+from ...inputs.refusal_messages import listed
 from ...model.drive import Drive
 from ...model.shaft_ratio import turns
 from ...model.torsion import Elastic

@@ -17,7 +17,7 @@ from ...control.custom_controller import as_laws
 from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.quantities import Time, argument
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.couplings import FULL_COMMAND
 from ...model.drive import Drive
 from ...model.mass_matrix import MassMatrix

@@ -6,7 +6,7 @@ from typing import Any
 from ... import _core
 from ...errors import InputError, prefixed
 from ...inputs.quantities import argument
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.drive import Drive
 from ...model.mass_matrix import MassMatrix
 from ...model.train import DriveTrain

@@ -9,7 +9,7 @@ import numpy as np
 from ... import _core
 from ...control.controller import Controller
 from ...errors import InputError
-from ...inputs.validation import did_you_mean, shown
+from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.synchronous_motor import PhaseValues
 from ...model.train import DriveTrain
 from ..scenario.field_oriented_motors import CURRENTS, oriented

@@ -29,7 +29,7 @@ from ...inputs.quantities import (
     Time,
     Whole,
 )
-from ...inputs.validation import unknown_key
+from ...inputs.refusal_messages import unknown_key
 from ...model.angle_torques import STANDARD_GRAVITY
 from ...model.duty import Amplifier, Duty, HoldingBrake, Supply
 from ...model.motor import STEPPER_KEYS, Motor, MotorLimits

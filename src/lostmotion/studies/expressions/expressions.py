@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ...inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
-from ...inputs.validation import MAX_LISTED, listed, nearest, shortened
+from ...inputs.refusal_messages import MAX_LISTED, listed, nearest, shortened
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, FunctionParameter
 from .measures import Measure, measure, plain, power, product, text_of, total
 from .vocabulary import OF_THE_RUN, Vocabulary

@@ -17,7 +17,7 @@ from ...sizing.axis_task.candidate_scenario import Cycles, begins_alike, cycles_
 from ...sizing.axis_task.cycle_demands import Repeated, change
 
 if TYPE_CHECKING:
-    from ..study.study import Study
+    from ..study.study_definition import Study
 
 VARIABLES = ("command", "motor_torque", "motor_speed", "output_torque", "load_angle", "load_speed", "twist")
 """from which the columns of a task are made"""

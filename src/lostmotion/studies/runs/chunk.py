@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 from ...simulation.runs.results import installed_version
 from ...simulation.scenario.scenario import Scenario
-from ..study.study import Study
+from ..study.study_definition import Study
 from ..study.study_files import from_json
 from ..study.wanted_values import channels, needed, reductions
 from .axis_pairs import run_axes

@@ -21,7 +21,7 @@ from ...atomic_writer import write_bytes
 from ...errors import InputError, need
 from ...inputs.arguments import checked
 from ...inputs.quantities import Count
-from ..study.study import Study
+from ..study.study_definition import Study
 from ..study.study_files import from_json, to_json
 from .chunk import as_parquet, as_table, compute_chunk, parsed, pieces, run_piece
 from .stored_parts import (

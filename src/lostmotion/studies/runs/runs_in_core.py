@@ -15,7 +15,7 @@ from ...simulation.scenario.one_gear import drive_keys, has_one_gear
 from ...simulation.scenario.scenario import Scenario
 from ..expressions.functions import REDUCTIONS
 from ..study.drive_check_columns import COLUMNS, check_columns
-from ..study.study import Study
+from ..study.study_definition import Study
 from ..study.vary import Vary, base_value
 from ..study.wanted_values import asks_for, channels, checks_drives, needed, reductions
 from .chunk_results import Runs, spread

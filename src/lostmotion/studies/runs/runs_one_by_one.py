@@ -9,7 +9,7 @@ from ...simulation.runs.run import run
 from ...simulation.scenario.field_oriented_motors import bound_values
 from ...worker_threads import thread_pool
 from ..study.drive_check_columns import COLUMNS, check_columns
-from ..study.study import Study
+from ..study.study_definition import Study
 from ..study.wanted_values import asks_for, checks_drives, needed
 from .chunk_results import Runs
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from ...atomic_writer import unwritable, write_bytes
 from ...errors import InputError
 from ..study.random_designs import CHUNK
-from ..study.study import Study
+from ..study.study_definition import Study
 
 CHECKSUMS = "_checksums.txt"  # as `sha256sum` writes and checks it; readers of Parquet directories pass it over
 

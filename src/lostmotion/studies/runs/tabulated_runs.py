@@ -15,7 +15,7 @@ from ...simulation.scenario.scenario import Scenario
 from ...worker_threads import thread_pool
 from ..study.records_that_vary import kind_of_record
 from ..study.select_table import TASK_SHARES, USE
-from ..study.study import Study
+from ..study.study_definition import Study
 from ..study.wanted_values import asks_for, used
 from .chunk_results import Runs
 

@@ -15,7 +15,7 @@ from ...sizing.axis_task.mass_and_price import CHOICE
 from ...units.practical import excess, told_apart
 from ..runs.axis_pairs import Axes
 from ..study.drive_check_columns import NO_DATA, UNSTABLE
-from ..study.study import Study
+from ..study.study_definition import Study
 from .ranking import WINDOW, RankedCandidate
 
 SLOWEST = 10.0  # times as long as the cycle of the task, the longest that is tried

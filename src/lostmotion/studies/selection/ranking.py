@@ -14,7 +14,7 @@ from ..runs.read_table import unit_of
 from ..study.drive_check_columns import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE
 from ..study.records_that_vary import shown_name
 from ..study.select_table import TASK_SHARES, USE, Selection
-from ..study.study import Study
+from ..study.study_definition import Study
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -15,7 +15,7 @@ from ...inputs.quantities import Count
 from ...sizing.axis_task.cycle_demands import COLUMNS
 from ..runs.read_table import read_table, unit_of
 from ..runs.run_study import study
-from ..study.study import Study
+from ..study.study_definition import Study
 from .ranking import candidates, pareto_front
 from .task_file import load_task
 

@@ -12,9 +12,9 @@ from ...data_sheets.records import find
 from ...errors import InputError, inside
 from ...inputs.arguments import checked
 from ...inputs.quantities import argument
+from ...inputs.refusal_messages import shown, unknown_key
 from ...inputs.schema import follow, unit_in_schema
 from ...inputs.toml_files import read_toml
-from ...inputs.validation import shown, unknown_key
 from ...model.angle_torques import STANDARD_GRAVITY
 from ...model.gears_in_series import DIRECT
 from ...model.signals import ForceSignal, TorqueSignal
@@ -31,7 +31,7 @@ from ...sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from ..study.records_that_vary import kind_of_record, names_that_fit
 from ..study.select_table import Selection
 from ..study.stepper_candidates import is_stepper
-from ..study.study import Study
+from ..study.study_definition import Study
 from ..study.study_files import find_sheets
 from ..study.task_keys import with_first
 

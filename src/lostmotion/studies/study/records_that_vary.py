@@ -9,9 +9,9 @@ from typing import Any
 from ...data_sheets.records import KINDS, called, catalogue, find, read_again
 from ...data_sheets.train_components import CONDITIONS, RECORD_KINDS, RECORDS, without_record
 from ...errors import InputError
+from ...inputs.refusal_messages import did_you_mean, listed, shown
 from ...inputs.schema import unit_in_schema
 from ...inputs.toml_files import is_in_file
-from ...inputs.validation import did_you_mean, listed, shown
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.units_of_keys import in_si
 

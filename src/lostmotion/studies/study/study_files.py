@@ -14,7 +14,7 @@ from ...simulation.runs.loading import load
 from ...simulation.runs.result_files import FORMATS
 from ...simulation.scenario.scenario_files import find_base, read_tables
 from .records_that_vary import kind_of_record, names_of
-from .study import Study
+from .study_definition import Study
 
 
 @checked

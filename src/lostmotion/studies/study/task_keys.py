@@ -5,8 +5,8 @@ from copy import deepcopy
 from typing import Any
 
 from ...errors import InputError
+from ...inputs.refusal_messages import shown
 from ...inputs.schema import follow, unit_in_schema
-from ...inputs.validation import shown
 from ...model.linear_motor import LinearMotorData
 from ...model.motor import Motor
 from ...simulation.forms.dotted_keys import list_index

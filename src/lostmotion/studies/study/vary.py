@@ -15,7 +15,7 @@ from ...inputs.cached_values import kept
 from ...inputs.named_elements import Named
 from ...inputs.part import Part
 from ...inputs.quantities import Switch
-from ...inputs.validation import shown
+from ...inputs.refusal_messages import shown
 from ...model.signals import Signal
 from ...reproducible import exp, log
 from ...simulation.forms.dotted_keys import list_index

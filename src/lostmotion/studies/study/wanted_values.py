@@ -1,6 +1,6 @@
 """Values that a study takes from its runs: result variables, reductions of them, energies, the drive check."""
 
-from .study import Study
+from .study_definition import Study
 
 
 def asks_for(study: Study, name: str) -> bool:

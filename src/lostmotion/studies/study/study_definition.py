@@ -13,7 +13,7 @@ from ...data_sheets.records import Sheet, find
 from ...errors import InputError
 from ...inputs.part import Part
 from ...inputs.quantities import Whole
-from ...inputs.validation import did_you_mean, listed
+from ...inputs.refusal_messages import did_you_mean, listed
 from ...model.duty import HoldingBrake
 from ...model.motor import Motor
 from ...simulation.scenario.scenario import Scenario
