@@ -10,8 +10,8 @@ import numpy as np
 
 from ..model.losses import LossMap
 from ..reports.looks import FAINT, LEVEL, STYLES, step
-from ..reports.pages import panels_csv, plain, table_csv
-from ..reports.panels import Chart, Curve, Ground, Panel, scientific
+from ..reports.pages import panels_csv, table_csv
+from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
 from ..response.crossovers import THREE_DECIBELS
 from ..response.rigid import rigid_constants
 from .published_drive import AMPLITUDES, MODELS, paper_scenario
@@ -35,11 +35,12 @@ class FigureSpec:
     number: str
     title: str
     caption: str
-    panels: tuple[Panel, ...] = ()
+    panels: tuple[Chart, ...]
     columns: int = 2
     size: tuple[float, float] = (10.0, 6.4)
     stand_in: bool = True  # whether the loss table shows in it
     heading: str = ""  # its numbers in the paper, if it is more than one
+    table: str = ""  # its data as CSV, where those are not the data of its panels
 
 
 def _pairs(
@@ -76,22 +77,6 @@ def _differences(panels: Iterable[Panel], label: str) -> Iterator[Panel]:
         others = tuple(Curve(c.label, c.x, c.y - linear.y, c.style) for c in curves.values())
         amplitude = panel.title.rpartition(" ")[2]
         yield replace(panel, title=_titled("difference from 2-DOF-L", float(amplitude)), y_label=label, curves=others)
-
-
-SCHEMATICS = FigureSpec(
-    "01",
-    "Schematics",
-    "The comparison (1), the drive in general (2), the two traditional models (3, 4), and the measurement of a gearbox (6).",
-    stand_in=False,
-    heading="Figures 1 to 4 and 6",
-)
-LOSS_MAP = FigureSpec(
-    "05",
-    "Loss coefficient over speed and load",
-    "Left, contours over speed and load; right, curves over speed. The loss does not vanish at zero load, so no constant "
-    "efficiency describes it.",
-    size=(10.0, 4.2),
-)
 
 
 LOOP_STYLES: tuple[dict[str, Any], ...] = (*(STYLES[name] for name in ("2-DOF-NL", "2-DOF-L", "1-DOF-L")),)
@@ -132,8 +117,8 @@ def _speed_and_load(results: Results, **options: Any) -> tuple[Panel, ...]:
 def figure_specs(results: Results, facts: Facts) -> list[FigureSpec]:
     """All figures in the order of the paper, with their data."""
     return [
-        SCHEMATICS,
-        LOSS_MAP,
+        _schematics_spec(),
+        _loss_spec(),
         _stiffness_spec(results),
         _hysteresis_spec(results),
         *_torque_specs(results),
@@ -142,6 +127,45 @@ def figure_specs(results: Results, facts: Facts) -> list[FigureSpec]:
         *_power_specs(results, facts),
         *_response_specs(results),
     ]
+
+
+def _schematics_spec() -> FigureSpec:
+    return FigureSpec(
+        "01",
+        "Schematics",
+        "The comparison (1), the drive in general (2), the two traditional models (3, 4), and the measurement of a gearbox (6).",
+        drawings(),
+        stand_in=False,
+        heading="Figures 1 to 4 and 6",
+    )
+
+
+def _loss_spec() -> FigureSpec:
+    losses = paper_scenario("2-DOF-NL", "large").gearbox.losses
+    assert isinstance(losses, LossMap)
+    speeds, loads, values = np.array(losses.speeds), np.array(losses.loads), np.array(losses.values)
+    curves = tuple(
+        Curve(f"load {load:g}", speeds, row, step(k, len(loads)) | {"marker": "o", "markersize": 4})
+        for k, (load, row) in enumerate(zip(loads, values, strict=True))
+    )
+    speed, load, loss = "relative speed [-]", "relative load [-]", "loss coefficient [-]"
+    rows = (
+        [v, mu, m]
+        for mu, row in zip(losses.loads, losses.values, strict=True)
+        for v, m in zip(losses.speeds, row, strict=True)
+    )
+    return FigureSpec(
+        "05",
+        "Loss coefficient over speed and load",
+        "Left, contours over speed and load; right, curves over speed. The loss does not vanish at zero load, so no constant "
+        "efficiency describes it.",
+        (
+            Panel("Contours", speed, load, (), ground=Ground(speeds, loads, values, loss)),
+            Panel("Curves", speed, loss, curves, y_range=(0.0, 1.06 * float(values.max()))),
+        ),
+        size=(10.0, 4.2),
+        table=table_csv(["relative_speed", "relative_load", "loss_coefficient (stand-in)"], rows),
+    )
 
 
 def _stiffness_spec(results: Results) -> FigureSpec:
@@ -253,20 +277,13 @@ def _gearbox_specs(results: Results) -> Iterator[FigureSpec]:
     spring = paper_scenario("2-DOF-NL", "large").gearbox.stiffness
     rated_twist = 3.0e-3
     assert abs(spring.torque(rated_twist) / _rated_values()[1] - 1.0) < 0.02  # type: ignore[union-attr]
-    least = min(float(results.runs["2-DOF-NL", amplitude]["loss_coefficient"].min()) for amplitude in AMPLITUDES)
+    along = list(_pairs(results, lambda r: r["loss_coefficient"].values, "loss coefficient [-]", models=("2-DOF-NL",)))
+    least = min(float(panel.curves[0].y.min()) for panel in along)
     yield FigureSpec(
         "13",
         "Loss coefficient along the motion",
         f"m_2B at each instant. It is never less than {least:.3f}. Where the motor shaft is stuck, it is the start-up value at the load.",
-        tuple(
-            _pairs(
-                results,
-                lambda r: r["loss_coefficient"].values,
-                "loss coefficient [-]",
-                models=("2-DOF-NL",),
-                y_range=(0.0, None),
-            )
-        ),
+        tuple(replace(p, y_range=(0.0, 1.06 * float(p.curves[0].y.max()))) for p in along),
         size=(10.0, 3.4),
     )
     yield FigureSpec(
@@ -383,70 +400,18 @@ def _response_panels(
         )
 
 
-def _stand_in_table() -> tuple[Any, Any, Any]:
-    losses = paper_scenario("2-DOF-NL", "large").gearbox.losses
-    assert isinstance(losses, LossMap)
-    return np.array(losses.speeds), np.array(losses.loads), np.array(losses.values)
-
-
 def draw(spec: FigureSpec) -> Figure:
     """The figure of a spec."""
     from ..reports import plots
     from . import schematics
 
-    shaded = any(panel.shaded for panel in spec.panels)
-    note = " ".join([SHADED] * shaded + [STAND_IN] * spec.stand_in)
-    if spec.number == SCHEMATICS.number:
+    if isinstance(spec.panels[0], Drawing):
         return schematics.draw()
-    panels = _loss_panels() if spec.number == LOSS_MAP.number else spec.panels
-    return plots.draw(panels, spec.columns, spec.size, note=note)
-
-
-def charts_of(spec: FigureSpec) -> tuple[Chart, ...]:
-    """Charts of a specification on a page, with plain labels."""
-    if spec.number == SCHEMATICS.number:
-        return drawings()
-    if spec.number == LOSS_MAP.number:
-        return _loss_panels()
-    return tuple(map(_plainly, spec.panels))
-
-
-def _loss_panels() -> tuple[Panel, Panel]:
-    """The loss coefficient as contours and as curves."""
-    speeds, loads, values = _stand_in_table()
-    curves = tuple(
-        Curve(f"load {load:g}", speeds, row, step(k, len(loads)) | {"marker": "o", "markersize": 4})
-        for k, (load, row) in enumerate(zip(loads, values, strict=True))
-    )
-    labels = ("relative speed [-]", "relative load [-]", "loss coefficient [-]")
-    ground = Ground(speeds, loads, values, "loss coefficient [-]")
-    return (
-        Panel("Contours", *labels[:2], (), ground=ground),
-        Panel("Curves", labels[0], labels[2], curves, y_range=(0.0, 1.06 * float(values.max()))),
-    )
-
-
-def _plainly(panel: Panel) -> Panel:
-    """The panel without TeX, and with both ends of the range of y."""
-    curves = tuple(
-        replace(c, label=plain(c.label), legend=None if c.legend is None else plain(c.legend)) for c in panel.curves
-    )
-    low, high = panel.y_range or (None, None)
-    if low is not None and high is None:
-        high = 1.06 * max(float(np.nanmax(c.y)) for c in curves)
-    limits = None if low is None or high is None else (low, high)
-    titles = {"title": plain(panel.title), "x_label": plain(panel.x_label), "y_label": plain(panel.y_label)}
-    return replace(panel, curves=curves, y_range=limits, **titles)  # type: ignore[arg-type]
+    shaded = any(isinstance(panel, Panel) and panel.shaded for panel in spec.panels)
+    note = " ".join([SHADED] * shaded + [STAND_IN] * spec.stand_in)
+    return plots.draw(spec.panels, spec.columns, spec.size, note=note)
 
 
 def figure_csv(spec: FigureSpec) -> str | None:
     """The data of a figure: long form, one row a point; none of the schematics."""
-    if spec.number == SCHEMATICS.number:
-        return None
-    if spec.number != LOSS_MAP.number:
-        return panels_csv(spec.panels)
-    speeds, loads, values = _stand_in_table()
-    rows = [
-        [speed, load, v] for load, row in zip(loads, values, strict=True) for speed, v in zip(speeds, row, strict=True)
-    ]
-    return table_csv(["relative_speed", "relative_load", "loss_coefficient (stand-in)"], rows)
+    return None if isinstance(spec.panels[0], Drawing) else spec.table or panels_csv(spec.panels)

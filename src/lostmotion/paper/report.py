@@ -5,7 +5,7 @@ import re
 from ..reports.page import cards, document, verdict
 from ..reports.pages import render_page
 from ..reports.panels import Chart, scientific
-from .figures import FigureSpec, charts_of
+from .figures import FigureSpec
 from .published_drive import AMPLITUDES, MODELS, Constant
 from .quoted_numbers import Facts
 from .runs import FREQUENCIES
@@ -27,10 +27,10 @@ def render(specs: list[FigureSpec], table: list[Constant], facts: Facts, *, live
         caption = Markup("<b>{}. {}.</b> {} {}").format(
             spec.heading or f"Figure {int(number)}", spec.title, Markup(_powers(str(escape(spec.caption)))), mark
         )
-        shown = Markup(cards(charts_of(spec), charts, spec.columns))
+        shown = Markup(cards(spec.panels, charts, spec.columns))
         return Markup('<section id="figure-{}">{}<p class="about">{}</p></section>\n').format(number, shown, caption)
 
-    glance = Markup(cards(charts_of(by_number[AT_A_GLANCE]), charts))
+    glance = Markup(cards(by_number[AT_A_GLANCE].panels, charts))
     body = render_page(
         "paper/report.html.jinja",
         facts=facts,

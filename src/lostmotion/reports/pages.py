@@ -35,17 +35,12 @@ def panels_csv(panels: Iterable[Chart]) -> str:
     for panel in panels:
         if not isinstance(panel, Panel):
             continue
-        behind = _row(panel.x_label, panel.y_label)
+        behind = table_csv((panel.x_label, panel.y_label), ()).rstrip("\n")
         for curve in panel.curves:
-            before = _row(panel.title, curve.label)
+            before = table_csv((panel.title, curve.label), ()).rstrip("\n")
             points = zip(np.asarray(curve.x).tolist(), np.asarray(curve.y).tolist(), strict=True)
             rows += [f"{before},{x!r},{y!r},{behind}" for x, y in points]
     return "\n".join([*rows, ""])
-
-
-def _row(*labels: str) -> str:
-    """Labels without their markup, as cells."""
-    return table_csv(map(plain, labels), ()).rstrip("\n")
 
 
 def write_report(directory: Path, report: Report, pictures: Sequence[str] = ()) -> Path:
@@ -69,11 +64,6 @@ def write_report(directory: Path, report: Report, pictures: Sequence[str] = ()) 
 
 def _has_panels(group: Group) -> bool:
     return any(isinstance(chart, Panel) and chart.curves for chart in group.charts)
-
-
-def plain(label: str) -> str:
-    """A label without its markup."""
-    return label.replace("$", "").replace("{", "").replace("}", "")
 
 
 def render_page(template: str, **context: Any) -> str:
