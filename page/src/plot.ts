@@ -253,9 +253,11 @@ export class Plot {
       c.strokeStyle = colour("edge");
       c.lineWidth = 1;
       c.beginPath();
-      for (let k = 0; k + 1 < x.length; k += 3) {
-        c.moveTo(...this.place(x[k]!, y[k]!));
-        c.lineTo(...this.place(x[k + 1]!, y[k + 1]!));
+      let drawn = false;
+      for (let k = 0; k < x.length; k++) {
+        const seen = Number.isFinite(x[k]!);
+        if (seen) c[drawn ? "lineTo" : "moveTo"](...this.place(x[k]!, y[k]!));
+        drawn = seen;
       }
       c.stroke();
       const [left, top] = this.place(...label);

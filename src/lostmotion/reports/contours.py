@@ -14,7 +14,7 @@ class Contour:
     """The places where the quantity has one value."""
 
     text: str
-    x: np.ndarray  # ends of straight segments, with NaN between two segments
+    x: np.ndarray  # points of lines, with NaN between two lines
     y: np.ndarray
     label: tuple[float, float]  # point at which the value is written
 
@@ -37,53 +37,29 @@ def ticks(low: float, high: float, count: float, degrees: bool = False, whole: b
 
 
 def contours(x: Any, y: Any, values: Any, *, log_x: bool, log_y: bool, degrees: bool = False) -> list[Contour]:
-    """Contours at round values.
-
-    Each cell of the grid is cut into two triangles, on which the quantity is linear over the axes as they are drawn.
+    """Contours at round values; within a cell of the grid they are straight over the axes as they are drawn.
 
     x, y: values along the axes, rising.
     values: the quantity, shape (y, x); NaN where there is none.
     log_x, log_y: whether an axis is logarithmic.
     degrees: whether the quantity is an angle in degrees.
     """
+    from contourpy import LineType, contour_generator
+
     u, v = (np.log(a) if log else np.asarray(a, float) for a, log in ((x, log_x), (y, log_y)))
-    z = np.asarray(values, float)
-    found = z[np.isfinite(z)]
-    if len(found) == 0 or float(np.ptp(found)) <= 1e-9 * float(np.abs(found).max()):
+    z = np.ma.masked_invalid(values)
+    if z.count() == 0 or float(np.ptp(z.compressed())) <= 1e-9 * float(np.abs(z).max()):
         return []
-    a, b = np.meshgrid(u, v)
-    nodes = np.stack([a, b, z], axis=-1)
-    corners = (nodes[:-1, :-1], nodes[:-1, 1:], nodes[1:, 1:], nodes[1:, :-1])
-    triangles = np.concatenate(
-        [np.stack([corners[k] for k in ks], axis=-2).reshape(-1, 3, 3) for ks in ((0, 1, 2), (0, 2, 3))]
-    )
-    triangles = triangles[np.isfinite(triangles).all(axis=(1, 2))]
-    out = []
+    lines = contour_generator(u, v, z, corner_mask=True, line_type=LineType.ChunkCombinedNan).lines
+    size = np.array([np.ptp(u) or 1.0, np.ptp(v) or 1.0])
     to_x, to_y = (np.exp if log else np.asarray for log in (log_x, log_y))
-    low, high = float(found.min()), float(found.max())
-    for level in ticks(low, high, LINES, degrees):
-        if not low < level < high or len(ends := _cut(triangles, level)) == 0:
+    out = []
+    for level in ticks(float(z.min()), float(z.max()), LINES, degrees):
+        line = lines(level)[0][0]
+        if line is None or not z.min() < level < z.max():
             continue
-        middle = ends.mean(axis=1)
-        size = np.array([np.ptp(u) or 1.0, np.ptp(v) or 1.0])
-        at = middle[np.argmin((((middle - [u.mean(), v.mean()]) / size) ** 2).sum(axis=1))]
-        line = np.concatenate([ends, np.full((len(ends), 1, 2), np.nan)], axis=1).reshape(-1, 2)
+        middle = 0.5 * (line[1:] + line[:-1])
+        at = middle[np.nanargmin((((middle - [u.mean(), v.mean()]) / size) ** 2).sum(axis=1))]
         place = float(to_x(at[0])), float(to_y(at[1]))
         out.append(Contour(f"{level:g}".replace("-", "−"), to_x(line[:, 0]), to_y(line[:, 1]), place))
     return out
-
-
-def _cut(triangles: np.ndarray, level: float) -> np.ndarray:
-    """Both ends of the line across each triangle on which its corners have the value: shape (segments, 2, 2)."""
-    above = triangles[:, :, 2] > level
-    alone = np.where(above.sum(axis=1) == 1, above.argmax(axis=1), (~above).argmax(axis=1))
-    crossed = (above.sum(axis=1) % 3) != 0
-    t, alone = triangles[crossed], alone[crossed]
-    rows = np.arange(len(t))
-    apex = t[rows, alone]
-    ends = []
-    for k in (1, 2):
-        other = t[rows, (alone + k) % 3]
-        share = (level - apex[:, 2]) / (other[:, 2] - apex[:, 2])
-        ends.append(apex[:, :2] + share[:, None] * (other[:, :2] - apex[:, :2]))
-    return np.stack(ends, axis=1)

@@ -193,8 +193,7 @@ def _contours(panel: Panel, to_x: Scale, to_y: Scale) -> str:
     """Contours of a map with their values, where these do not cover each other."""
     lines, texts, written = [], [], list[tuple[float, float]]()
     for contour in panel.contours():
-        points = np.column_stack([to_x(contour.x), to_y(contour.y)]).reshape(-1, 3, 2)[:, :2].tolist()
-        lines += [f"M{a:.1f} {b:.1f}L{c:.1f} {d:.1f}" for (a, b), (c, d) in points]
+        lines.append(_path(np.column_stack([to_x(contour.x), to_y(contour.y)])))
         x, y = float(to_x(contour.label[0])), float(to_y(contour.label[1]))
         if all(abs(x - a) > APART[0] or abs(y - b) > APART[1] for a, b in written):
             texts.append(f'<text class="tick contour" x="{x:.1f}" y="{y + 4:.1f}">{contour.text}</text>')
