@@ -1,11 +1,11 @@
 """A camera on the axis, and the filter that makes angle, rate and acceleration of a target from its frames."""
 
-from typing import Annotated, Self
-
-from pydantic import model_validator
+from collections.abc import Iterator
+from typing import Annotated
 
 from .. import _core
 from ..inputs.core_parameters import CameraFields, TrackerFields
+from ..inputs.part import rule
 from ..inputs.quantities import NotNegative, Positive, Time
 
 
@@ -21,13 +21,12 @@ class Camera(CameraFields):
     latency: Annotated[Time, NotNegative] = 0.0
     """from the exposure of a frame until the controller has what it shows; a whole multiple, too"""
 
-    @model_validator(mode="after")
-    def _sees_a_pixel(self) -> Self:
+    @rule
+    def _sees_a_pixel(self) -> Iterator[str]:
         if self.pixel is None and self.pixel_parts != 1:
-            raise ValueError("has pixel_parts but no pixel; add its angle")
+            yield "has pixel_parts but no pixel; add its angle"
         if self.pixel is not None and self.field is not None and self.pixel > self.field:
-            raise ValueError(f"has pixel = {self.pixel:g} rad, more than its field, {self.field:g} rad; check both")
-        return self
+            yield f"has pixel = {self.pixel:g} rad, more than its field, {self.field:g} rad; check both"
 
 
 class Tracker(TrackerFields):
@@ -36,28 +35,27 @@ class Tracker(TrackerFields):
     With the expected x, v, a at a frame and r = measured - x: ``x += alpha r``, ``v += (beta/T) r``, ``a += (gamma/(2 T^2)) r`` (Kalata 1984).
     """
 
-    @model_validator(mode="after")
-    def _has_its_gains(self) -> Self:
+    @rule
+    def _has_its_gains(self) -> Iterator[str]:
         if self.tracking_index is not None:
             given = [key for key in ("alpha", "beta") if getattr(self, key) is not None] + ["gamma"] * (
                 self.gamma > 0.0
             )
             if given:
-                raise ValueError(f"has tracking_index and {given[0]}, which follows from it; give one of them")
-            return self
+                yield f"has tracking_index and {given[0]}, which follows from it; give one of them"
+            return
         lacking = [key for key in ("alpha", "beta") if getattr(self, key) is None]
         if lacking:
-            raise ValueError(f"lacks {lacking[0]}; give alpha and beta, or tracking_index")
+            yield f"lacks {lacking[0]}; give alpha and beta, or tracking_index"
         alpha, beta, gamma = self.gains()
         stable = 2.0 * alpha + beta < 4.0 and alpha < 2.0
         if gamma > 0.0:
             stable = stable and 4.0 * alpha * beta + alpha * gamma - 2.0 * gamma > 0.0
         if not stable:
-            raise ValueError(
+            yield (
                 f"has alpha = {alpha:g}, beta = {beta:g}, gamma = {gamma:g}, with which its errors grow; keep alpha < 2, 2 alpha + beta < 4 and "
                 "gamma (2 - alpha) < 4 alpha beta"
             )
-        return self
 
     def gains(self) -> tuple[float, float, float]:
         """alpha, beta and gamma."""

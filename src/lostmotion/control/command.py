@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import itertools
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import lru_cache
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Frequency, Limit, Number, Positive, Time, Whole
 from ..model.signals import Breakpoint, Samples, Signal, taylor
 from ..recorded_numbers import real
@@ -57,14 +57,13 @@ class Stepping(Part):
     standstill_delay: Annotated[Time, Positive] = 0.1
     """time after the last microstep after which the current falls to the motor's `standstill_current`"""
 
-    @model_validator(mode="after")
-    def _has_one_source(self) -> Stepping:
+    @rule
+    def _has_one_source(self) -> Iterator[str]:
         given = [key for key in ("reference", "travel", "pulses") if getattr(self, key) is not None]
         if len(given) != 1:
-            raise ValueError(f"has {' and '.join(given) or 'no reference'}; give one of reference, travel and pulses")
+            yield f"has {' and '.join(given) or 'no reference'}; give one of reference, travel and pulses"
         if self.pulses is not None and any(abs(d) != 1.0 for d in self.pulses.values):
-            raise ValueError("has pulses whose directions are not all 1 or -1; values are the direction of each pulse")
-        return self
+            yield "has pulses whose directions are not all 1 or -1; values are the direction of each pulse"
 
     def steps(self, turns: float, step: float, until: float) -> tuple[np.ndarray, np.ndarray]:
         """Instants [s] at which the field moves, and its number of microsteps from there on, from 0 at t = 0.
@@ -123,12 +122,11 @@ class CommandSignal(Signal[Number]):
     stepping: Stepping | None = None
     """steps of the driver of a stepper, in place of all else"""
 
-    @model_validator(mode="after")
-    def _steps_alone(self) -> CommandSignal:
+    @rule
+    def _steps_alone(self) -> Iterator[str]:
         others = [key for key in self.model_fields_set - {"stepping"} if getattr(self, key) not in (None, 0.0, ())]
         if self.stepping is not None and others:
-            raise ValueError(f"has stepping and {sorted(others)[0]}, which both turn the field; leave one out")
-        return self
+            yield f"has stepping and {sorted(others)[0]}, which both turn the field; leave one out"
 
 
 class FieldAngle(Signal[Number]):

@@ -4,15 +4,15 @@ import itertools
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .. import _core
 from ..errors import InputError, inside, need
 from ..inputs.arguments import checked
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Angle,
     Inertia,
@@ -81,15 +81,14 @@ class _PID(Part):
         own: Any = self
         return own.gain, own.integral_gain, own.derivative_gain
 
-    @model_validator(mode="after")
-    def _has_a_use(self) -> Self:
+    @rule
+    def _has_a_use(self) -> Iterator[str]:
         k_p, k_i, k_d = self.gains
         if k_p == k_i == k_d == 0.0:
-            raise ValueError("has no gain; give gain, integral_gain or derivative_gain")
+            yield "has no gain; give gain, integral_gain or derivative_gain"
         given = [key for key in ("derivative_weight", "filter_time") if getattr(self, key) != 0.0]
         if k_d == 0.0 and given:
-            raise ValueError(f"has {given[0]} but no derivative_gain; give one, or leave it out")
-        return self
+            yield f"has {given[0]} but no derivative_gain; give one, or leave it out"
 
     def system(self, anti_windup_time: float | None) -> LinearSystem:
         """The controller of reference and measured value, and of their rates where the derivative has no filter."""
@@ -137,13 +136,10 @@ class SpeedPID(_PID):
     derivative_gain: Annotated[Inertia, NotNegative] = 0.0
     """k_d"""
 
-    @model_validator(mode="after")
-    def _filtered(self) -> Self:
+    @rule
+    def _filtered(self) -> Iterator[str]:
         if self.derivative_gain > 0.0 and self.filter_time == 0.0:
-            raise ValueError(
-                "has a derivative_gain without filter_time: the derivative of a speed jumps with the torque; give a filter_time"
-            )
-        return self
+            yield "has a derivative_gain without filter_time: the derivative of a speed jumps with the torque; give a filter_time"
 
 
 class StateSpace(Part):
@@ -162,24 +158,19 @@ class StateSpace(Part):
     back_calculation: tuple[Number, ...] | None = None
     """per state, what the excess over the limit adds to its rate: x' = A x + B e + back_calculation (u - v)"""
 
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
+    @rule
+    def _fits(self) -> Iterator[str]:
         n, m = len(self.C), len(self.D)
         if n > MAX_ORDER:
-            raise ValueError(f"has {n} states; at most {MAX_ORDER} are possible")
+            yield f"has {n} states; at most {MAX_ORDER} are possible"
         if m not in (1, 2):
-            raise ValueError(f"has {m} entries in D; give one, of the error, or two, of reference and measured value")
+            yield f"has {m} entries in D; give one, of the error, or two, of reference and measured value"
         shapes = {"A": (self.A, n), "B": (self.B, m)}
         for name, (rows, wide) in shapes.items():
             if len(rows) != n or any(len(row) != wide for row in rows):
-                raise ValueError(
-                    f"has C of {n} states and D of {m} inputs, so that {name} must be {n} x {wide}; check it"
-                )
+                yield f"has C of {n} states and D of {m} inputs, so that {name} must be {n} x {wide}; check it"
         if self.back_calculation is not None and len(self.back_calculation) != n:
-            raise ValueError(
-                f"has {len(self.back_calculation)} entries in back_calculation; give one for each of {n} states"
-            )
-        return self
+            yield f"has {len(self.back_calculation)} entries in back_calculation; give one for each of {n} states"
 
     def winds_up(self) -> bool:
         """Whether a state neither decays by itself nor follows the limited output."""
@@ -229,30 +220,27 @@ class ContinuousController(Part):
     """position control of a hobby servo: error to duty cycle to the torque of its winding"""
     current: Annotated[IdealCurrent | FirstOrderCurrent | VoltageCommand, Field(discriminator="kind")] = IdealCurrent()
 
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
+    @rule
+    def _fits_together(self) -> Iterator[str]:
         kind = self.reference.kind
         given = [key for key in ("position", "speed", "state_space", "firmware") if getattr(self, key) is not None]
         if len(given) != 1 or given[0] not in _follow(kind):
             has = f"has {' and '.join(given)}" if given else "has no controller"
-            raise ValueError(f"{has}; with a reference of the {kind}, give {kind} or state_space, and one alone")
+            yield f"{has}; with a reference of the {kind}, give {kind} or state_space, and one alone"
         voltage = isinstance(self.current, VoltageCommand)
         if voltage and (self.state_space is None or self.limit is not None):
-            raise ValueError(
+            yield (
                 'has current.kind = "voltage", for which there is state_space alone, limited by the motor\'s voltage; leave out '
                 + ("limit" if self.state_space is not None else given[0])
             )
         pid = self.position or self.speed
         if self.anti_windup_time is not None and (pid is None or pid.gains[1] == 0.0):
-            raise ValueError(
+            yield (
                 "has an anti_windup_time but no integral_gain; leave it out"
                 + ("" if pid is not None else ", or give state_space.back_calculation")
             )
         if self._needs_rate() and any(a != b for a, b in _jumps(self.reference)):
-            raise ValueError(
-                "has a reference with steps, whose derivative has no bounds; give a filter_time, or derivative_weight = 0"
-            )
-        return self
+            yield "has a reference with steps, whose derivative has no bounds; give a filter_time, or derivative_weight = 0"
 
     def system(self) -> LinearSystem:
         """Matrices of the given controller."""

@@ -1,11 +1,12 @@
 """The controller of a motor: reference, encoders, loops and their sample times."""
 
 from collections.abc import Iterator, Mapping
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Discriminator, Field, Tag, model_validator
+from pydantic import Discriminator, Field, Tag
 
 from ..inputs.core_parameters import ReferenceBlocks
+from ..inputs.part import rule
 from ..inputs.quantities import NotNegative, Positive, Switch, Time, Whole
 from ..recorded_numbers import real
 from .camera import Camera, Tracker
@@ -78,8 +79,8 @@ class Controller(ReferenceBlocks):
     tracker: Tracker | None = None
     """filter of the frames of the camera"""
 
-    @model_validator(mode="after")
-    def _loops_fit_the_reference(self) -> Self:
+    @rule
+    def _loops_fit_the_reference(self) -> Iterator[str]:
         wanted = {"position": ("position", "speed"), "speed": ("speed",), "torque": ()}[self.reference.kind]
         if self.firmware is not None:
             wanted = ()
@@ -87,13 +88,9 @@ class Controller(ReferenceBlocks):
         if self.law:
             wanted = ()
             if isinstance(self.current, CurrentLoop):
-                raise ValueError(
-                    'has law = true and a current loop of kind "pi"; with a law of one\'s own, take "ideal", "first_order", "voltage" or "field_oriented"'
-                )
+                yield 'has law = true and a current loop of kind "pi"; with a law of one\'s own, take "ideal", "first_order", "voltage" or "field_oriented"'
         elif isinstance(self.current, VoltageCommand):
-            raise ValueError(
-                'has current.kind = "voltage", which needs law = true; take "pi", "field_oriented", "first_order" or "ideal"'
-            )
+            yield 'has current.kind = "voltage", which needs law = true; take "pi", "field_oriented", "first_order" or "ideal"'
         for loop in ("position", "speed"):
             present = getattr(self, loop) is not None
             if present and loop not in wanted:
@@ -104,31 +101,26 @@ class Controller(ReferenceBlocks):
                     if self.firmware
                     else f"a reference of the {self.reference.kind}"
                 )
-                raise ValueError(f"has the loop {loop}, which has no use with {why}; leave it out")
+                yield f"has the loop {loop}, which has no use with {why}; leave it out"
             if not present and loop in wanted:
-                raise ValueError(
-                    f"lacks {loop}, the loop that follows a reference of the {self.reference.kind}; add its gain"
-                )
+                yield f"lacks {loop}, the loop that follows a reference of the {self.reference.kind}; add its gain"
         if self.encoder is None and (self.law or self.firmware is not None or self.speed is not None):
-            raise ValueError("lacks encoder; give its lines, bits or resolution, or ideal = true")
+            yield "lacks encoder; give its lines, bits or resolution, or ideal = true"
         if self.position_encoder is not None and self.position is None and self.firmware is None and not self.law:
-            raise ValueError("has a position_encoder but no position loop; leave it out")
+            yield "has a position_encoder but no position loop; leave it out"
         if self.blend_time is not None and self.position_encoder is None:
-            raise ValueError("has a blend_time but no position_encoder to blend; leave it out")
+            yield "has a blend_time but no position_encoder to blend; leave it out"
         if self.feedforward != Feedforward() and self.speed is None:
-            raise ValueError("has a feedforward, which the speed loop adds, but no speed loop; leave it out")
+            yield "has a feedforward, which the speed loop adds, but no speed loop; leave it out"
         self._check_camera()
         blocks = [key for key in ReferenceBlocks.model_fields if getattr(self, key) is not None]
         if blocks and self.position is not None and self.position.reference_delay > 0.0:
-            raise ValueError(
-                f"has {blocks[0]} and position.reference_delay, which takes the reference as it is given; leave one out"
-            )
+            yield f"has {blocks[0]} and position.reference_delay, which takes the reference as it is given; leave one out"
         if self.inverse_model is not None:
             if self.speed is None:
-                raise ValueError("has an inverse_model, which the speed loop adds, but no speed loop; leave it out")
+                yield "has an inverse_model, which the speed loop adds, but no speed loop; leave it out"
             if self.feedforward != Feedforward():
-                raise ValueError("has feedforward and inverse_model, which both add the torque that is known; give one")
-        return self
+                yield "has feedforward and inverse_model, which both add the torque that is known; give one"
 
     def _check_firmware(self) -> None:
         if self.law:

@@ -1,12 +1,14 @@
 """Encoders: what a controller reads of an angle."""
 
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .. import _core
 from ..errors import InputError
 from ..inputs.core_parameters import EncoderFields
+from ..inputs.part import rule
 from ..inputs.quantities import Whole
 
 RESOLUTION_KEYS = ("lines", "bits", "grating_period", "resolution")
@@ -31,22 +33,19 @@ class Encoder(EncoderFields):
     shaft: str | None = None
     """shaft with the encoder; default: the motor's shaft"""
 
-    @model_validator(mode="after")
-    def _has_a_resolution(self) -> Self:
+    @rule
+    def _has_a_resolution(self) -> Iterator[str]:
         given = [key for key in RESOLUTION_KEYS if getattr(self, key) is not None]
         if self.ideal and given:
-            raise ValueError(f"is ideal and has {given[0]}; leave one of them out")
+            yield f"is ideal and has {given[0]}; leave one of them out"
         if not self.ideal and not given:
-            raise ValueError(
-                "has no resolution; give lines, bits or resolution as the data sheet does, or ideal = true for an encoder without steps"
-            )
+            yield "has no resolution; give lines, bits or resolution as the data sheet does, or ideal = true for an encoder without steps"
         if self.resolution is not None and len(given) > 1:
-            raise ValueError(f"has resolution and {given[0]}, which says the same; give one of them")
+            yield f"has resolution and {given[0]}, which says the same; give one of them"
         if self.grating_period is not None and self.lines is not None:
-            raise ValueError("has lines and grating_period; lines are of a turn, so leave one of them out")
+            yield "has lines and grating_period; lines are of a turn, so leave one of them out"
         if self.error > 0.0 and self.error_periods is None and self.lines is None and self.grating_period is None:
-            raise ValueError("has an error but no error_periods; add how many of its periods a turn has")
-        return self
+            yield "has an error but no error_periods; add how many of its periods a turn has"
 
     def check_shaft(self, *, slides: bool) -> None:
         """Refuse what a turn has on a slide, and a grating on a shaft."""

@@ -1,15 +1,17 @@
 """Filters of references and torques, as discrete-time systems."""
 
 import math
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .. import _core
 from ..errors import InputError
 from ..inputs import core_parameters
 from ..inputs.arguments import checked
+from ..inputs.part import rule
 
 
 class LowPass(core_parameters.LowPassFields):
@@ -29,15 +31,12 @@ class TransferFunction(core_parameters.TransferFunctionFields):
 
     kind: Literal["transfer_function"] = "transfer_function"
 
-    @model_validator(mode="after")
-    def _can_be_computed(self) -> Self:
+    @rule
+    def _can_be_computed(self) -> Iterator[str]:
         if self.denominator[0] == 0.0:
-            raise ValueError("has a denominator that begins with 0; leave the zero out")
+            yield "has a denominator that begins with 0; leave the zero out"
         if len(self.numerator) > len(self.denominator):
-            raise ValueError(
-                "has more zeros than poles, so that it would need values of the future; lower the order of its numerator"
-            )
-        return self
+            yield "has more zeros than poles, so that it would need values of the future; lower the order of its numerator"
 
 
 Filter = Annotated[LowPass | Notch | TransferFunction, Field(discriminator="kind")]

@@ -1,13 +1,14 @@
 """The position control of a hobby servo's firmware: from the position error by a duty cycle to a torque."""
 
 import itertools
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.core_parameters import FirmwareFields
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, NotNegative, Number, Share
 from ..reproducible import interpolate
 
@@ -22,17 +23,14 @@ class DutyCurve(Part):
     values: tuple[Annotated[Number, Share], ...]
     """duty cycle at each of them, from 0 on"""
 
-    @model_validator(mode="after")
-    def _fits(self) -> Self:
+    @rule
+    def _fits(self) -> Iterator[str]:
         if len(self.errors) < 2 or len(self.values) != len(self.errors):
-            raise ValueError(
-                f"has {len(self.errors)} errors and {len(self.values)} values; give as many of both, two at least"
-            )
+            yield f"has {len(self.errors)} errors and {len(self.values)} values; give as many of both, two at least"
         if self.errors[0] != 0.0 or self.values[0] != 0.0:
-            raise ValueError("does not begin at 0; make the first error and the first value 0")
+            yield "does not begin at 0; make the first error and the first value 0"
         if any(b <= a for a, b in itertools.pairwise(self.errors)):
-            raise ValueError("has errors that do not rise; put each one above that before it")
-        return self
+            yield "has errors that do not rise; put each one above that before it"
 
 
 class Firmware(FirmwareFields):

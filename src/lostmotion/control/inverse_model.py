@@ -1,8 +1,7 @@
 """Feedforward by the model of the drive, with losses over load and speed that may adapt, and the load that follows from it."""
 
-from typing import Any, Self
-
-from pydantic import model_validator
+from collections.abc import Iterator
+from typing import Any
 
 from ..errors import InputError
 from ..inputs.core_parameters import (
@@ -11,6 +10,7 @@ from ..inputs.core_parameters import (
     LoadObserverFields,
     LossAdaptationLawFields,
 )
+from ..inputs.part import rule
 from ..model.gear import Gear
 from ..model.losses import ConstantEfficiency, LossMap, MeshEfficiency, WormMesh, efficiency_map
 from ..model.torsion import Rigid
@@ -45,8 +45,8 @@ class InverseModel(InverseModelFields):
     friction_adaptation: FrictionAdaptationLaw | None = None
     load_observer: LoadObserver | None = None
 
-    @model_validator(mode="after")
-    def _starts_within_limits(self) -> Self:
+    @rule
+    def _starts_within_limits(self) -> Iterator[str]:
         for law, key, value in (
             (self.loss_adaptation, "loss_factor", self.loss_factor),
             (self.friction_adaptation, "friction_torque", self.friction_torque),
@@ -55,10 +55,9 @@ class InverseModel(InverseModelFields):
                 continue
             low, high = law.limits
             if not low < high:
-                raise ValueError(f"has limits = {[low, high]}, which must rise; check them")
+                yield f"has limits = {[low, high]}, which must rise; check them"
             if value is not None and not low <= value <= high:
-                raise ValueError(f"has {key} = {value:g}, outside the limits {[low, high]} of its adaptation")
-        return self
+                yield f"has {key} = {value:g}, outside the limits {[low, high]} of its adaptation"
 
     def solver_fields(self, train: DriveTrain, motor: str, shaft: str, *, on_motor: bool) -> dict[str, Any]:
         """Fields for the solver, for a motor whose reference is of a shaft; `on_motor`: the position is measured on the motor.

@@ -1,8 +1,9 @@
 """The loops of a servo cascade: position, speed, current, and what is fed forward."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..inputs.core_parameters import (
     CurrentLoopFields,
@@ -13,7 +14,7 @@ from ..inputs.core_parameters import (
     PositionLoopFields,
     SpeedLoopFields,
 )
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Positive, Time
 from .filters import Filter
 
@@ -27,18 +28,13 @@ class SampledLoop(Part):
 class PositionLoop(SampledLoop, PositionLoopFields):
     """``speed = sat(gain e + integral + feedforward * rate of the reference)``, in terms of the reference's shaft."""
 
-    @model_validator(mode="after")
-    def _dead_zone_has_a_use(self) -> Self:
+    @rule
+    def _dead_zone_has_a_use(self) -> Iterator[str]:
         if self.dead_zone is not None:
             if self.integral_gain == 0.0:
-                raise ValueError(
-                    "has a dead_zone, which holds the integrator, but no integral_gain; give one, or leave dead_zone out"
-                )
+                yield "has a dead_zone, which holds the integrator, but no integral_gain; give one, or leave dead_zone out"
             if self.dead_zone[1] < self.dead_zone[0]:
-                raise ValueError(
-                    f"has dead_zone = {list(self.dead_zone)} rad; the outer error, which comes second, must not be smaller"
-                )
-        return self
+                yield f"has dead_zone = {list(self.dead_zone)} rad; the outer error, which comes second, must not be smaller"
 
 
 class Difference(DifferenceFields):
@@ -70,11 +66,10 @@ class SpeedLoop(SampledLoop, SpeedLoopFields):
     reference_filters: tuple[Filter, ...] = ()
     torque_filters: tuple[Filter, ...] = ()
 
-    @model_validator(mode="after")
-    def _one_integral(self) -> Self:
+    @rule
+    def _one_integral(self) -> Iterator[str]:
         if self.integral_gain is not None and self.integral_time is not None:
-            raise ValueError("has integral_gain and integral_time, which say the same; give one of them")
-        return self
+            yield "has integral_gain and integral_time, which say the same; give one of them"
 
     @property
     def k_i(self) -> float:
@@ -127,8 +122,7 @@ class FieldOriented(FieldOrientedFields, SampledCurrent):
 class Feedforward(FeedforwardFields):
     """Torque of the motor that the reference is known to need: J a + b w + T_c sgn w + T_L, in terms of the motor."""
 
-    @model_validator(mode="after")
-    def _rate_with_backlash(self) -> Self:
+    @rule
+    def _rate_with_backlash(self) -> Iterator[str]:
         if self.backlash > 0.0 and self.backlash_rate is None:
-            raise ValueError("has backlash but no backlash_rate; add the speed at which the reference crosses the gap")
-        return self
+            yield "has backlash but no backlash_rate; add the speed at which the reference crosses the gap"

@@ -2,15 +2,16 @@
 
 import itertools
 import math
+from collections.abc import Iterator
 from functools import lru_cache
-from typing import Annotated, Any, ClassVar, Generic, Literal, Self, TypeVar
+from typing import Annotated, Any, ClassVar, Generic, Literal, TypeVar
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.core_parameters import V
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Acceleration,
     Angle,
@@ -77,14 +78,13 @@ class Reference(TimeFunction[V], Generic[V]):
     samples: Series[V] | None = None  #: curve through points
     derivatives: ClassVar[int] = 3
 
-    @model_validator(mode="after")
-    def _representable(self) -> Self:
+    @rule
+    def _representable(self) -> Iterator[str]:
         self._check()
         with np.errstate(all="ignore"):
             finite = np.isfinite(self.pieces()).all()
         if not finite:
-            raise ValueError("has a value or a derivative beyond the range of numbers; check its times and values")
-        return self
+            yield "has a value or a derivative beyond the range of numbers; check its times and values"
 
     def _check(self) -> None:
         """Refuses what does not fit together, with a `ValueError`."""

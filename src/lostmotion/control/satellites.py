@@ -1,13 +1,15 @@
 """Satellites as targets, from two-line elements by SGP4."""
 
 import math
+from collections.abc import Iterator
 from datetime import UTC, datetime
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
 from ..errors import need
+from ..inputs.part import rule
 from ..inputs.quantities import Angle, Length, Limit, Time
 from ..reproducible import cos, sin
 from .targets import ORDER, Jet, TargetPath
@@ -48,19 +50,14 @@ class Satellite(TargetPath):
     def _in_utc(cls, value: datetime) -> datetime:
         return value.replace(tzinfo=UTC) if value.tzinfo is None else value.astimezone(UTC)
 
-    @model_validator(mode="after")
-    def _can_be_read(self) -> Self:
+    @rule
+    def _can_be_read(self) -> Iterator[str]:
         for number, line in enumerate(self.elements, start=1):
             if len(line) < 69 or not line.startswith(f"{number} "):
-                raise ValueError(
-                    f'has elements whose line {number} is no line of a two-line element set; it must begin with "{number} " and have 69 characters'
-                )
+                yield f'has elements whose line {number} is no line of a two-line element set; it must begin with "{number} " and have 69 characters'
             given = sum(int(c) if c.isdigit() else c == "-" for c in line[:68]) % 10
             if str(given) != line[68]:
-                raise ValueError(
-                    f"has elements whose line {number} ends with the check digit {line[68]}, and its digits give {given}; copy it anew"
-                )
-        return self
+                yield f"has elements whose line {number} ends with the check digit {line[68]}, and its digits give {given}; copy it anew"
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         need("scipy", "A satellite", "satellites")

@@ -5,12 +5,13 @@ right; elevation E = atan2(z, sqrt(x^2 + y^2)). All derivatives are derivatives 
 """
 
 import math
-from typing import Annotated, Any, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, Frequency, Length, LinearSpeed, NotNegative, Positive, Speed, Time
 from ..reproducible import arctan2, cos, cubic_spline, sin
 
@@ -141,13 +142,10 @@ class Weave(Crossing):
     frequency: Annotated[Frequency, Positive]  #: swings in a second
     path: Literal["weave"]
 
-    @model_validator(mode="after")
-    def _stays_in_front(self) -> Self:
+    @rule
+    def _stays_in_front(self) -> Iterator[str]:
         if self.width >= self.distance:
-            raise ValueError(
-                f"has width = {self.width:g} m, not less than its distance, {self.distance:g} m; take less"
-            )
-        return self
+            yield f"has width = {self.width:g} m, not less than its distance, {self.distance:g} m; take less"
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         x, y, z = super().position(t)
@@ -166,11 +164,10 @@ class Circle(TargetPath):
     """starting point on the circle, as an angle from the point farthest along the bearing, to the right"""
     path: Literal["circle"]
 
-    @model_validator(mode="after")
-    def _misses_the_station(self) -> Self:
+    @rule
+    def _misses_the_station(self) -> Iterator[str]:
         if self.radius == self.distance:
-            raise ValueError("passes over the station, where its traverse jumps; change its radius or its distance")
-        return self
+            yield "passes over the station, where its traverse jumps; change its radius or its distance"
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         omega = self.speed / self.radius
@@ -188,18 +185,15 @@ class Track(TargetPath):
     z: tuple[Length, ...]  #: up, at each instant
     path: Literal["track"]
 
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
+    @rule
+    def _fits_together(self) -> Iterator[str]:
         lengths = {key: len(getattr(self, key)) for key in ("times", "x", "y", "z")}
         if len(set(lengths.values())) > 1:
-            raise ValueError(f"has lists of different length, {lengths}; give one position for each time")
+            yield f"has lists of different length, {lengths}; give one position for each time"
         if np.any(np.diff(self.times) <= 0.0):
-            raise ValueError("has times that do not rise; sort them, and give each once")
+            yield "has times that do not rise; sort them, and give each once"
         if self.times[0] > 0.0 or self.times[-1] < self.duration:
-            raise ValueError(
-                f"has times from {self.times[0]:g} s to {self.times[-1]:g} s, which must cover 0 to duration = {self.duration:g} s"
-            )
-        return self
+            yield f"has times from {self.times[0]:g} s to {self.times[-1]:g} s, which must cover 0 to duration = {self.duration:g} s"
 
     def position(self, t: np.ndarray) -> tuple[Jet, Jet, Jet]:
         pieces = cubic_spline(self.times, np.array([self.x, self.y, self.z]).T)

@@ -1,13 +1,13 @@
 """The data sheet of a gearbox, as manufacturers print it, and the parts that follow from it."""
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from ..errors import InputError
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Angle,
     Inertia,
@@ -49,16 +49,13 @@ class StiffnessData(Part):
     torques: tuple[Annotated[Torque, Positive], ...] = ()  #: T1, T2, ...: one fewer
     scatter: Annotated[Number, NotNegative] | None = None  #: relative, from unit to unit
 
-    @model_validator(mode="after")
-    def _matches(self) -> Self:
+    @rule
+    def _matches(self) -> Iterator[str]:
         if len(self.torques) != len(self.slopes) - 1:
-            raise ValueError(
-                f"has {len(self.slopes)} slopes and {len(self.torques)} torques; it needs one torque fewer"
-            )
+            yield f"has {len(self.slopes)} slopes and {len(self.torques)} torques; it needs one torque fewer"
         for a, b in itertools.pairwise(self.torques):
             if b <= a:
-                raise ValueError(f"has torques that do not rise: {b} N*m follows {a} N*m")
-        return self
+                yield f"has torques that do not rise: {b} N*m follows {a} N*m"
 
     def breaks(self) -> tuple[float, ...]:
         """Twists [rad] at which the stiffness changes."""
@@ -111,19 +108,17 @@ class GearboxSheet(GearboxLoads, Record):
             table["stiffness"] = {"slopes": [table["stiffness"]]}
         return table
 
-    @model_validator(mode="after")
-    def _rigid_has_no_twist(self) -> Self:
+    @rule
+    def _rigid_has_no_twist(self) -> Iterator[str]:
         if self.rigid:
             for key in ("stiffness", "backlash", "hysteresis_loss", "hysteresis_efficiency"):
                 if getattr(self, key) is not None:
-                    raise ValueError(f"is rigid and has {key}; a rigid gearbox has no twist, so leave one of them out")
-        return self
+                    yield f"is rigid and has {key}; a rigid gearbox has no twist, so leave one of them out"
 
-    @model_validator(mode="after")
-    def _one_hysteresis(self) -> Self:
+    @rule
+    def _one_hysteresis(self) -> Iterator[str]:
         if self.hysteresis_loss is not None and self.hysteresis_efficiency is not None:
-            raise ValueError("has hysteresis_loss and hysteresis_efficiency; they say the same, so give one")
-        return self
+            yield "has hysteresis_loss and hysteresis_efficiency; they say the same, so give one"
 
     def missing(self) -> dict[str, str]:
         """Data that a run requires and the record lacks: the key of `[gearbox]`, and a hint to its place."""

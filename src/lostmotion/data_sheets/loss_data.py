@@ -1,11 +1,10 @@
 """Loss data of a gearbox as a data sheet prints them."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass
-from typing import Annotated, Self
+from typing import Annotated
 
-from pydantic import model_validator
-
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import KinematicViscosity, Limit, NotNegative, Number, Positive, Speed, Temperature, Torque
 from ..model.losses import LossMap
 from ..reproducible import log10, power
@@ -36,13 +35,10 @@ class Lubricant(Part):
     viscosity_40: Annotated[KinematicViscosity, Positive]
     viscosity_100: Annotated[KinematicViscosity, Positive]
 
-    @model_validator(mode="after")
-    def _thins(self) -> Self:
+    @rule
+    def _thins(self) -> Iterator[str]:
         if self.viscosity_100 >= self.viscosity_40:
-            raise ValueError(
-                f"has viscosity_100 = {self.viscosity_100} m^2/s, not below viscosity_40; oil thins when hot"
-            )
-        return self
+            yield f"has viscosity_100 = {self.viscosity_100} m^2/s, not below viscosity_40; oil thins when hot"
 
     def viscosity(self, temperature: float) -> float:
         """Kinematic viscosity [m^2/s] at a temperature [°C], by Ubbelohde and Walther (ASTM D341)."""
@@ -94,14 +90,14 @@ class LossData(Part):
     """load-dependent loss at standstill / that in motion, where no static or back-driving datum says it"""
     table: LossMap | None = None  #: a whole loss map, which makes all others superfluous
 
-    @model_validator(mode="after")
-    def _consistent(self) -> Self:
+    @rule
+    def _consistent(self) -> Iterator[str]:
         names = ("efficiency", "no_load_torque", "starting_torque", "static_efficiency", "backdriving_torque")
         given = [name for name in names if getattr(self, name) not in (None, ())]
         if self.table is not None and given:
-            raise ValueError(f"has a table and {given[0]}; the table says all, so give one or the other")
+            yield f"has a table and {given[0]}; the table says all, so give one or the other"
         if self.load_correction and len([p for p in self.efficiency if p.load == 1.0]) != 1:
-            raise ValueError("has a load_correction, which needs exactly one efficiency at load 1 to act on")
+            yield "has a load_correction, which needs exactly one efficiency at load 1 to act on"
         for name, points in (
             ("efficiency", self.all_efficiencies()),
             ("backdrive_efficiency", self.backdrive_efficiency),
@@ -109,14 +105,11 @@ class LossData(Part):
             seen = set()
             for p in points:
                 if p.efficiency > 1.0:
-                    raise ValueError(
-                        f"has a load_correction that makes the efficiency at load {p.load} {p.efficiency:.3f}, above 1"
-                    )
+                    yield f"has a load_correction that makes the efficiency at load {p.load} {p.efficiency:.3f}, above 1"
                 key = (p.input_speed, p.load, p.temperature)
                 if key in seen:
-                    raise ValueError(f"has {name} twice at {p.input_speed:.6g} rad/s and load {p.load}; keep one")
+                    yield f"has {name} twice at {p.input_speed:.6g} rad/s and load {p.load}; keep one"
                 seen.add(key)
-        return self
 
     def all_efficiencies(self) -> tuple[EfficiencyPoint, ...]:
         """The efficiencies with the ones that the load correction adds."""

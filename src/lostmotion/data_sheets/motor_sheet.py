@@ -1,10 +1,12 @@
 """The data sheet of a motor, and the motor that follows from it."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
+from ..inputs.part import rule
 from ..inputs.quantities import (
     Current,
     Inductance,
@@ -69,26 +71,23 @@ class MotorSheet(MotorHeat, Record):
     resistance_phase: Annotated[Resistance, Positive] | None = None  #: of a phase of a stepper
     inductance_phase: Annotated[Inductance, Positive] | None = None  #: of a phase of a stepper
 
-    @model_validator(mode="after")
-    def _fits_kind(self) -> Self:
+    @rule
+    def _fits_kind(self) -> Iterator[str]:
         given = set(self.given()) - {"total_mass", "overall_length", "price", "lead_time"}
         if self.kind == "stepper":
             if idle := sorted(given - {*STEPPER_DATA, *SHARED_DATA}):
-                raise ValueError(f"has {idle[0]}, which a stepper has no use for; leave it out")
-            return self
+                yield f"has {idle[0]}, which a stepper has no use for; leave it out"
+            return
         if idle := sorted(given & set(STEPPER_DATA)):
-            raise ValueError(f'has {idle[0]}, which only a motor of kind "stepper" has; leave it out')
+            yield f'has {idle[0]}, which only a motor of kind "stepper" has; leave it out'
         if self.kind != "synchronous":
             if self.winding is not None:
-                raise ValueError('has a winding, which only a motor of kind "synchronous" has')
+                yield 'has a winding, which only a motor of kind "synchronous" has'
             if self.rated_voltage is None:
-                raise ValueError("lacks rated_voltage, at which its data hold")
+                yield "lacks rated_voltage, at which its data hold"
         elif idle := [key for key in BLOCK_KEYS if getattr(self, key) is not None]:
             own = "torque_constant_rms or torque_constant_peak" if idle[0] == "torque_constant" else "its data"
-            raise ValueError(
-                f'has {idle[0]}; a motor of kind "synchronous" has [motor.winding] with {own}, and dc_voltage'
-            )
-        return self
+            yield f'has {idle[0]}; a motor of kind "synchronous" has [motor.winding] with {own}, and dc_voltage'
 
     def missing(self) -> dict[str, str]:
         """Data that a run requires and the record lacks."""

@@ -2,12 +2,12 @@
 
 import inspect
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
-from functools import cache
+from functools import cache, wraps
 from typing import Any, Self
 
-from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError
+from pydantic import BaseModel, ConfigDict, GetJsonSchemaHandler, ValidationError, model_validator
 from pydantic_core import CoreSchema
 
 from ..errors import InputError
@@ -143,6 +143,18 @@ class Part(BaseModel, metaclass=PartType):
         """Name of the part in messages: the torsion curve."""
         name = cls.model_config.get("title") or cls.__name__.split("[")[0]
         return "the " + " ".join(re.findall("[A-Z]+(?![a-z])|[A-Z][a-z]*", name)).lower()
+
+
+def rule(problems: Callable[[Any], Iterator[str]]) -> Any:
+    """Rule of a part: a method that yields what is wrong with values that do not fit together. The first is reported."""
+
+    @wraps(problems)
+    def check(part: Part) -> Part:
+        if problem := next(problems(part), ""):
+            raise ValueError(problem)
+        return part
+
+    return model_validator(mode="after")(check)
 
 
 @cache  # it takes longer than all the rest of a refusal

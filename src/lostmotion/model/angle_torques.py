@@ -1,15 +1,15 @@
 """Elements that depend on the angle of a shaft: gravity, cogging, ripple, and the transmission error of a gear."""
 
 import math
-from collections.abc import Callable
-from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal, Self
+from collections.abc import Callable, Iterator
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .. import _core
 from ..inputs import core_parameters
 from ..inputs.breakpoints import check_apart, check_rising
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, Length, Mass, NotNegative, Positive, Torque
 
 STANDARD_GRAVITY = 9.80665  # [m/s^2]
@@ -46,20 +46,17 @@ class AngleCurve(Part):
     def core(self) -> _core.PeriodicCurve:
         return _core.PeriodicCurve(self.period, self.angles, self.values())
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
         values = self.values()
         if len(self.angles) != len(values):
-            raise ValueError(f"has {len(self.angles)} angles and {len(values)} values; give as many of each")
+            yield f"has {len(self.angles)} angles and {len(values)} values; give as many of each"
         if self.angles[0] != 0.0:
-            raise ValueError(f"has angles that begin at {self.angles[0]}; the first must be 0")
+            yield f"has angles that begin at {self.angles[0]}; the first must be 0"
         check_rising(self.angles, "angles")
         check_apart((*self.angles, self.period), "angles")
         if self.angles[-1] >= self.period:
-            raise ValueError(
-                f"has angles that end at {self.angles[-1]}; the last must be below the period {self.period}, where the first value comes again"
-            )
-        return self
+            yield f"has angles that end at {self.angles[-1]}; the last must be below the period {self.period}, where the first value comes again"
 
 
 class PeriodicTorque:

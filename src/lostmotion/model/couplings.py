@@ -1,12 +1,11 @@
 """Elements that hold a shaft or join two at the same speed: brakes, clutches, freewheels, torque limiters, ratchets."""
 
-from typing import Annotated, Any, ClassVar, Literal, Self
-
-from pydantic import model_validator
+from collections.abc import Iterator
+from typing import Annotated, Any, ClassVar, Literal
 
 from ..inputs import core_parameters
 from ..inputs.core_parameters import CommandedFields
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import NotNegative, Number, Time
 from .signals import Signal
 
@@ -39,14 +38,13 @@ class Commanded(CommandedFields):
             raise ValueError(f"may reach {greatest:.6g}; it is a share, and 1 is the full torque, {self.torque:g} N*m")
         return command.delayed(self.engagement_delay, self.release_delay)
 
-    @model_validator(mode="after")
-    def _holds_at_least_its_torque(self) -> Self:
+    @rule
+    def _holds_at_least_its_torque(self) -> Iterator[str]:
         if self.breakaway_torque is not None and self.breakaway_torque < self.torque:
-            raise ValueError(
+            yield (
                 f"has breakaway_torque = {self.breakaway_torque} N*m, less than its torque in motion, {self.torque} N*m; "
                 "give at least that, or leave it out"
             )
-        return self
 
     def holding(self) -> float:
         """Capacity at rest [N·m]."""
@@ -80,11 +78,10 @@ class Clutch(Commanded, BetweenShafts):
     kind: Literal["friction", "safety"] = "friction"
     """`friction`: engaged by its command; `safety`: always engaged, slips at its torque"""
 
-    @model_validator(mode="after")
-    def _only_commanded_clutches_have_delays(self) -> Self:
+    @rule
+    def _only_commanded_clutches_have_delays(self) -> Iterator[str]:
         if self.kind == "safety" and (self.engagement_delay or self.release_delay):
-            raise ValueError("is a safety clutch, which has no command; remove engagement_delay and release_delay")
-        return self
+            yield "is a safety clutch, which has no command; remove engagement_delay and release_delay"
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""
@@ -122,14 +119,13 @@ class TorqueLimiter(core_parameters.TorqueLimiterFields, BetweenShafts):
     30.0
     """
 
-    @model_validator(mode="after")
-    def _slips_at_less(self) -> Self:
+    @rule
+    def _slips_at_less(self) -> Iterator[str]:
         if self.slip_torque > self.release_torque:
-            raise ValueError(
+            yield (
                 f"has slip_torque = {self.slip_torque} N*m, more than release_torque = {self.release_torque} N*m; "
                 "give at most that"
             )
-        return self
 
 
 class Ratchet(core_parameters.RatchetFields, BetweenShafts):

@@ -1,10 +1,10 @@
 """Dampers between two shafts: viscous and fluid couplings, eddy-current couplings, torsional vibration dampers."""
 
-from typing import ClassVar, Self
-
-from pydantic import model_validator
+from collections.abc import Iterator
+from typing import ClassVar
 
 from ..inputs.core_parameters import DamperFields
+from ..inputs.part import rule
 from .couplings import BetweenShafts
 from .shaft import WithDrag
 
@@ -27,8 +27,7 @@ class Damper(WithDrag, DamperFields, BetweenShafts):
         """Whether it has one linear regime."""
         return self.drag is None
 
-    @model_validator(mode="after")
-    def _has_a_torque(self) -> Self:
+    @rule
+    def _has_a_torque(self) -> Iterator[str]:
         if self.drag is None and not self.viscous_friction:
-            raise ValueError("has no torque at any slip; give viscous_friction or drag")
-        return self
+            yield "has no torque at any slip; give viscous_friction or drag"

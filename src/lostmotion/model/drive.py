@@ -1,15 +1,13 @@
 """A drive: a motor, a gearbox and a load, as frozen objects in SI units; a scenario file spells them word for word."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from functools import lru_cache
-from typing import ClassVar, Self
-
-from pydantic import model_validator
+from typing import ClassVar
 
 from .. import _core
 from ..inputs.cached_values import kept
 from ..inputs.named_elements import Named
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from .gear import Gear
 from .gearbox import Gearbox
 from .load import Load
@@ -44,16 +42,15 @@ class Drive(Part):
     def __repr__(self) -> str:
         return f"Drive({self.motor!r}, {self.gearbox!r}, {self.load!r})"
 
-    @model_validator(mode="after")
-    def _can_be_simulated(self) -> Self:
+    @rule
+    def _can_be_simulated(self) -> Iterator[str]:
         if self.motor.rotor_inertia + self.gearbox.inertia <= 0.0:
-            raise ValueError("has no inertia on the input shaft; give motor.rotor_inertia or gearbox.inertia")
+            yield "has no inertia on the input shaft; give motor.rotor_inertia or gearbox.inertia"
         if isinstance(self.gearbox.stiffness, Rigid) and self._least_rigid_inertia() <= 0.0:
-            raise ValueError(
+            yield (
                 "jams: the gearbox is rigid and so lossy when overrunning that with this load inertia there are instants "
                 "with no motion or several (the paradox of rigid friction); give gearbox.stiffness a compliance"
             )
-        return self
 
     @kept
     def train(self) -> DriveTrain:

@@ -1,11 +1,12 @@
 """Gravity, payloads and process forces on the load of an axis over its cycle; its supply and its holding brake."""
 
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Angle,
     Current,
@@ -58,13 +59,12 @@ class Payload(Part):
     """distance of its centre of gravity from the axis of a rotary load"""
     inertia: Annotated[Inertia, NotNegative] = 0.0  #: about its own centre of gravity, of a rotary load
 
-    @model_validator(mode="after")
-    def _lasts(self) -> Self:
+    @rule
+    def _lasts(self) -> Iterator[str]:
         if self.end <= self.begin:
-            raise ValueError(f"has end = {self.end:g} s, which is not after begin = {self.begin:g} s; exchange them")
+            yield f"has end = {self.end:g} s, which is not after begin = {self.begin:g} s; exchange them"
         if self.mass == 0.0 and self.inertia == 0.0:
-            raise ValueError("has neither mass nor inertia; add one")
-        return self
+            yield "has neither mass nor inertia; add one"
 
     def carried(self, time: np.ndarray) -> np.ndarray:
         """Whether it is carried, over time [s]."""
@@ -85,16 +85,15 @@ class Process(Part):
     torques: tuple[Torque, ...] | None = None  #: on a rotary load
     forces: tuple[Force, ...] | None = None  #: on a slide
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
         for one, other in (("times", "positions"), ("torques", "forces")):
             if (getattr(self, one) is None) == (getattr(self, other) is None):
-                raise ValueError(f"needs one of {one} and {other}")
+                yield f"needs one of {one} and {other}"
         if len(self.points()) != len(self.values()):
-            raise ValueError(f"has {len(self.points())} points and {len(self.values())} values; give as many of each")
+            yield f"has {len(self.points())} points and {len(self.values())} values; give as many of each"
         if any(b <= a for a, b in zip(self.points(), self.points()[1:], strict=False)):
-            raise ValueError(f"has {'times' if self.positions is None else 'positions'} that do not rise; order them")
-        return self
+            yield f"has {'times' if self.positions is None else 'positions'} that do not rise; order them"
 
     def points(self) -> tuple[float, ...]:
         """Times [s] or positions."""
@@ -163,15 +162,14 @@ class HoldingBrake(Part):
     """static, of a brake on the slide of a linear axis, in place of torque"""
     of_the_motor: Switch = False  #: the brake that is built into the record of the motor
 
-    @model_validator(mode="after")
-    def _holds_something(self) -> Self:
+    @rule
+    def _holds_something(self) -> Iterator[str]:
         if [self.torque is not None, self.force is not None, self.of_the_motor].count(True) != 1:
-            raise ValueError('needs torque, force of a brake on a slide, or the text "of the motor", one of them')
+            yield 'needs torque, force of a brake on a slide, or the text "of the motor", one of them'
         if self.of_the_motor and self.inertia > 0.0:
-            raise ValueError("has of_the_motor and inertia, which the record of the brake says; leave one of them out")
+            yield "has of_the_motor and inertia, which the record of the brake says; leave one of them out"
         if self.force is not None and self.inertia > 0.0:
-            raise ValueError("has force and inertia; a brake on a slide does not turn, so leave the inertia out")
-        return self
+            yield "has force and inertia; a brake on a slide does not turn, so leave the inertia out"
 
 
 class Amplifier(Part):
@@ -183,11 +181,10 @@ class Amplifier(Part):
     peak_time: Annotated[Time, Positive] | None = None  #: longest time above the continuous current
     max_dc_voltage: Annotated[Voltage, Positive] | None = None  #: largest voltage of the DC bus
 
-    @model_validator(mode="after")
-    def _peak_is_above(self) -> Self:
+    @rule
+    def _peak_is_above(self) -> Iterator[str]:
         if self.peak_current is not None and self.peak_current < self.continuous_current:
-            raise ValueError("has a peak_current below its continuous_current; exchange them")
-        return self
+            yield "has a peak_current below its continuous_current; exchange them"
 
 
 class Bus(Part):
@@ -203,14 +200,11 @@ class Bus(Part):
     returns_to_mains: Switch = False
     """the energy goes back to the mains, or a battery takes it: neither capacitors nor resistor are judged"""
 
-    @model_validator(mode="after")
-    def _in_order(self) -> Self:
+    @rule
+    def _in_order(self) -> Iterator[str]:
         start = self.start()
         if self.voltage_limit is not None and start is not None and self.voltage_limit <= start:
-            raise ValueError(
-                f"has voltage_limit = {self.voltage_limit:g} V, which is not above {start:g} V, the voltage of the bus"
-            )
-        return self
+            yield f"has voltage_limit = {self.voltage_limit:g} V, which is not above {start:g} V, the voltage of the bus"
 
     def start(self) -> float | None:
         """Voltage of the bus before energy returns [V]."""
@@ -225,11 +219,10 @@ class Supply(Bus):
     continuous_current: Annotated[Current, Positive] | None = None
     """continuous current of the amplifier, rms over the cycle"""
 
-    @model_validator(mode="after")
-    def _voltages_in_order(self) -> Self:
+    @rule
+    def _voltages_in_order(self) -> Iterator[str]:
         if self.min_voltage is not None and self.max_voltage is not None and self.max_voltage < self.min_voltage:
-            raise ValueError("has max_voltage below min_voltage; exchange them")
-        return self
+            yield "has max_voltage below min_voltage; exchange them"
 
     def start(self) -> float | None:
         """Voltage of the bus before energy returns [V]."""

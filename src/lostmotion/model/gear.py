@@ -1,11 +1,13 @@
 """A gear of a drive train: a stage between two shafts."""
 
+from collections.abc import Iterator
 from typing import Annotated, Any, Self
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ..errors import InputError
 from ..inputs.cached_values import kept
+from ..inputs.part import rule
 from .angle_torques import TransmissionError
 from .couplings import BetweenShafts
 from .gearbox import Gearbox, Transmission
@@ -40,13 +42,12 @@ class Gear(Transmission, BetweenShafts):
         housing = "" if self.housing is None else f" on {self.housing}"
         return f"Gear({self.input} -> {self.output}{housing}, {self.ratio:g}:1, {laws})"
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    @rule
+    def _complete(self) -> Iterator[str]:
         if isinstance(self.losses, LossMap):
             for key in ("rated_input_speed", "rated_output_torque"):
                 if getattr(self, key) is None:
-                    raise ValueError(f"lacks {key}, by which the loss map is scaled; add it")
-        return self
+                    yield f"lacks {key}, by which the loss map is scaled; add it"
 
     @kept
     def core_fields(self) -> dict[str, Any]:

@@ -1,12 +1,13 @@
 """Gearboxes: parameters and ratings."""
 
+from collections.abc import Iterator
 from typing import TYPE_CHECKING, Annotated, Any, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from ..inputs import core_parameters
 from ..inputs.core_parameters import TransmissionFields
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Force, Number, Positive, Speed, Time, Torque
 from ..units.practical import practical
 from .losses import ConstantEfficiency, LossMap
@@ -65,38 +66,34 @@ class Transmission(TransmissionFields):
             raise ValueError("is no ratio; give input speed / output speed, below 0 for a gear that reverses")
         return ratio
 
-    @model_validator(mode="after")
-    def _range_is_of_a_map(self) -> Self:
+    @rule
+    def _range_is_of_a_map(self) -> Iterator[str]:
         if self.loss_range is None:
-            return self
+            return
         if not isinstance(self.losses, LossMap):
-            raise ValueError(
-                f"has a loss_range beside losses of kind {self.losses.kind!r}; only those of a map are estimated"
-            )
+            yield f"has a loss_range beside losses of kind {self.losses.kind!r}; only those of a map are estimated"
         if self.loss_range[0] > self.loss_range[1]:
-            raise ValueError(f"has a loss_range that falls, from {self.loss_range[0]:g} to {self.loss_range[1]:g}")
-        return self
+            yield f"has a loss_range that falls, from {self.loss_range[0]:g} to {self.loss_range[1]:g}"
 
     def with_losses(self, factor: float) -> Self:
         """The gearbox with known losses: `factor` times the losses of the map."""
         return self.model_copy(update={"losses": self.losses.scaled(factor), "loss_range": None})
 
-    @model_validator(mode="after")
-    def _compliance_fits(self) -> Self:
+    @rule
+    def _compliance_fits(self) -> Iterator[str]:
         hysteresis = self.hysteresis is not None and self.hysteresis.efficiency < 1.0
         rigid = isinstance(self.stiffness, Rigid)
         backlash = not isinstance(self.stiffness, Rigid) and self.stiffness.has_gap
         if hysteresis and rigid:
-            raise ValueError("has hysteresis but is rigid; leave hysteresis out or give it a stiffness")
+            yield "has hysteresis but is rigid; leave hysteresis out or give it a stiffness"
         if self.mesh_stiffness is not None and rigid:
-            raise ValueError("has mesh_stiffness, a factor on its stiffness, but is rigid; give it a stiffness")
+            yield "has mesh_stiffness, a factor on its stiffness, but is rigid; give it a stiffness"
         if self.mesh_damping > 0.0 and rigid:
-            raise ValueError("has mesh damping but is rigid; leave mesh_damping out or give it a stiffness")
+            yield "has mesh damping but is rigid; leave mesh_damping out or give it a stiffness"
         if self.mesh_damping > 0.0 and backlash and hysteresis:
-            raise ValueError("has backlash with both mesh damping and hysteresis; leave one of the two out")
+            yield "has backlash with both mesh damping and hysteresis; leave one of the two out"
         if self.damping_limited and not (self.mesh_damping > 0.0 and backlash):
-            raise ValueError("has damping_limited, which needs mesh_damping and a stiffness with backlash; give both")
-        return self
+            yield "has damping_limited, which needs mesh_damping and a stiffness with backlash; give both"
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units, without the fields that are None."""
@@ -124,13 +121,10 @@ class Gearbox(core_parameters.GearboxFields, Transmission):  # type: ignore[misc
 
     losses: Annotated[ConstantEfficiency | LossMap, Field(discriminator="kind")]
 
-    @model_validator(mode="after")
-    def _strikes_not(self) -> Self:
+    @rule
+    def _strikes_not(self) -> Iterator[str]:
         if isinstance(self.stiffness, Rigid) and self.stiffness.strikes:
-            raise ValueError(
-                "has rigid flanks with backlash, which require a drive train; read the file by lm.load, or give a stiffness"
-            )
-        return self
+            yield "has rigid flanks with backlash, which require a drive train; read the file by lm.load, or give a stiffness"
 
     def __repr__(self) -> str:
         laws = f"stiffness {self.stiffness.kind}, losses {self.losses.kind}"

@@ -6,13 +6,14 @@ slide.
 """
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
 
 from pydantic import Field, field_validator, model_validator
 
 from ..errors import InputError
 from ..inputs import core_parameters
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Angle,
     Force,
@@ -102,28 +103,25 @@ class LinearDrive(Part):
 
     _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
-    @model_validator(mode="after")
-    def _compliance_is_clear(self) -> Self:
+    @rule
+    def _compliance_is_clear(self) -> Iterator[str]:
         if self.stiffness is not None and self.stiffness_curve is not None:
-            raise ValueError("has stiffness and stiffness_curve, which say the same; give one")
+            yield "has stiffness and stiffness_curve, which say the same; give one"
         if self.backdriving_efficiency is not None and self.efficiency is None:
-            raise ValueError("has a backdriving_efficiency without efficiency; give both, or leave it out")
+            yield "has a backdriving_efficiency without efficiency; give both, or leave it out"
         if self.preload > 0.0 and self.stiffness_curve is None and not self._goes_slack():
-            raise ValueError(
-                "has a preload, which acts on the segments of a stiffness_curve; give one, or leave it out"
-            )
+            yield "has a preload, which acts on the segments of a stiffness_curve; give one, or leave it out"
         if self.preload > 0.0 and self.backlash > 0.0:
-            raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
+            yield "has backlash and preload; a preload removes the backlash, so give only one"
         strikes = self.restitution is not None
         if strikes and (self._stiffness() is not None or self.backlash == 0.0):
             lacks = "a stiffness" if self.backlash > 0.0 else "no backlash"
-            raise ValueError(f"has a restitution and {lacks}; a restitution is that of rigid flanks with backlash")
+            yield f"has a restitution and {lacks}; a restitution is that of rigid flanks with backlash"
         if self._stiffness() is None:
             for key in ("backlash", "damping", "pitch_error", "hysteresis"):
                 if getattr(self, key) and not (strikes and key == "backlash"):
                     remedy = ", or the restitution of its flanks, 0 to 1" if key == "backlash" else ""
-                    raise ValueError(f'has {key} but is rigid; give it a stiffness, such as "200 N/um"{remedy}')
-        return self
+                    yield f'has {key} but is rigid; give it a stiffness, such as "200 N/um"{remedy}'
 
     def travel(self) -> float:
         """Travel of the slide to one turn of the input shaft [m]."""
@@ -245,26 +243,22 @@ class ScrewData(LinearDrive):
     density: Annotated[float, Unit("kg/m^3"), Positive] | None = None
     """default: steel, 7850 kg/m^3"""
 
-    @model_validator(mode="after")
-    def _is_a_screw(self) -> Self:
+    @rule
+    def _is_a_screw(self) -> Iterator[str]:
         one_way(self, {"lead": ("lead",), "pitch": ("pitch", "starts")})
         friction = [key for key in ("friction_coefficient", "friction_angle") if getattr(self, key) is not None]
         if len(friction) == 2:
-            raise ValueError("has friction_coefficient and friction_angle, which say the same; give one")
+            yield "has friction_coefficient and friction_angle, which say the same; give one"
         if friction and self.mean_diameter is None:
-            raise ValueError(f"has {friction[0]} without mean_diameter, which the lead angle needs; add it")
+            yield f"has {friction[0]} without mean_diameter, which the lead angle needs; add it"
         if friction and self.efficiency is not None:
-            raise ValueError(f"has efficiency and {friction[0]}, which say the same; give one")
+            yield f"has efficiency and {friction[0]}, which say the same; give one"
         if self.mean_diameter is not None and not friction:
-            raise ValueError(
-                "has a mean_diameter without friction_coefficient or friction_angle; add one, or leave it out"
-            )
+            yield "has a mean_diameter without friction_coefficient or friction_angle; add one, or leave it out"
         if friction:
             g, r = self.angles()
             if not g + r < 0.5 * math.pi:
-                raise ValueError(
-                    f"has a lead angle of {math.degrees(g):.4g} deg and a friction angle of {math.degrees(r):.4g} deg; their sum must be below 90 deg"
-                )
+                yield f"has a lead angle of {math.degrees(g):.4g} deg and a friction angle of {math.degrees(r):.4g} deg; their sum must be below 90 deg"
         if (self.supported_length is None) != (self.core_diameter is None):
             raise InputError(
                 "one of them is missing; the stiffness of the screw needs both", "supported_length", "core_diameter"
@@ -272,18 +266,17 @@ class ScrewData(LinearDrive):
         series = [k for k in ("nut_stiffness", "bearing_stiffness", "supported_length") if getattr(self, k) is not None]
         for key in ("stiffness", "stiffness_curve"):
             if series and getattr(self, key) is not None:
-                raise ValueError(f"has {key} and {series[0]}, which say the same; give one")
+                yield f"has {key} and {series[0]}, which say the same; give one"
         if self.supported_length is None:
             for key in ("support", "elastic_modulus"):
                 if getattr(self, key) is not None:
-                    raise ValueError(f"has {key}, which belongs to supported_length and core_diameter; add them")
+                    yield f"has {key}, which belongs to supported_length and core_diameter; add them"
         if (self.diameter is None) != (self.length is None):
             raise InputError("one of them is missing; the inertia of the screw needs both", "diameter", "length")
         if self.diameter is not None and self.inertia > 0.0:
-            raise ValueError("has inertia and diameter, which say the same; give one")
+            yield "has inertia and diameter, which say the same; give one"
         if self.diameter is None and self.density is not None:
-            raise ValueError("has a density, which belongs to diameter and length; add them")
-        return self
+            yield "has a density, which belongs to diameter and length; add them"
 
     def travel(self) -> float:
         if self.lead is not None:

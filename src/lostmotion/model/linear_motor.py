@@ -1,11 +1,12 @@
 """Linear motors: a force on a slide, from the data of the motor."""
 
 import math
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Current, Force, Length, Mass, NotNegative, Positive
 from ..units.conversion import Unit
 from .angle_torques import PositionHarmonic
@@ -39,24 +40,21 @@ class LinearMotorData(Part):
 
     _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
-    @model_validator(mode="after")
-    def _is_a_motor(self) -> Self:
+    @rule
+    def _is_a_motor(self) -> Iterator[str]:
         for name in ("rated", "peak"):
             force, current = f"{name}_force", f"{name}_current"
             if getattr(self, current) is not None and self.force_constant is None:
-                raise ValueError(f"has {current} without force_constant; add it, or give {force}")
+                yield f"has {current} without force_constant; add it, or give {force}"
             if getattr(self, force) is not None and getattr(self, current) is not None:
-                raise ValueError(f"has {force} and {current}, which with force_constant say the same; give one")
+                yield f"has {force} and {current}, which with force_constant say the same; give one"
         rated, peak = self.forces()
         if peak < rated:
-            raise ValueError(
-                f"has a peak force of {peak:g} N, less than the rated one, {rated:g} N; give at least that"
-            )
+            yield f"has a peak force of {peak:g} N, less than the rated one, {rated:g} N; give at least that"
         if (self.cogging_force is None) != (self.pole_pitch is None):
-            raise ValueError("has one of cogging_force and pole_pitch; the cogging needs both")
+            yield "has one of cogging_force and pole_pitch; the cogging needs both"
         if self.cogging_error is not None and self.cogging_force is None:
-            raise ValueError("has a cogging_error without cogging_force; add it, or leave the error out")
-        return self
+            yield "has a cogging_error without cogging_force; add it, or leave the error out"
 
     def forces(self) -> tuple[float, float]:
         """(rated, peak) [N]; infinite without a limit."""

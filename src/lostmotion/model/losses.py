@@ -2,13 +2,14 @@
 
 import itertools
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from .. import _core
 from ..inputs.breakpoints import check_apart
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, Length, Limit, NotNegative, Number, Positive, Switch, UpToOne, Whole
 from ..recorded_numbers import of_function
 from ..reproducible import arctan
@@ -67,28 +68,19 @@ class LossMap(Part):
         check_apart(axis)
         return axis
 
-    @model_validator(mode="after")
-    def _is_a_map(self) -> Self:
+    @rule
+    def _is_a_map(self) -> Iterator[str]:
         if self.speeds[0] != 0.0:
-            raise ValueError(f"has speeds that begin at {self.speeds[0]}; the first must be 0, for sticking")
+            yield f"has speeds that begin at {self.speeds[0]}; the first must be 0, for sticking"
         if len(self.values) != len(self.loads):
-            raise ValueError(
-                f"has {len(self.values)} rows of values for {len(self.loads)} loads; it needs one for each"
-            )
+            yield f"has {len(self.values)} rows of values for {len(self.loads)} loads; it needs one for each"
         for j, row in enumerate(self.values):
             if len(row) != len(self.speeds):
-                raise ValueError(
-                    f"has a hole: row {j} (load {self.loads[j]}) has {len(row)} values for {len(self.speeds)} speeds"
-                )
+                yield f"has a hole: row {j} (load {self.loads[j]}) has {len(row)} values for {len(self.speeds)} speeds"
         if self.mirrored and self.loads[0] != 0.0:
-            raise ValueError(
-                f"is mirrored, so its loads must begin at 0, not {self.loads[0]}; for a map of both directions set mirrored = false"
-            )
+            yield f"is mirrored, so its loads must begin at 0, not {self.loads[0]}; for a map of both directions set mirrored = false"
         if not self.mirrored and not self.loads[0] < 0.0 < self.loads[-1]:
-            raise ValueError(
-                "covers only one direction of power flow; add loads of the other sign or set mirrored = true"
-            )
-        return self
+            yield "covers only one direction of power flow; add loads of the other sign or set mirrored = true"
 
     def whole(self) -> tuple[list[float], list[float], list[list[float]]]:
         """(speeds, loads, values[load][speed]) with both signs of the load."""
@@ -177,25 +169,24 @@ class WormMesh(TwoEfficiencies):
     """in the mesh; r is its arc tangent"""
     kind: Literal["worm"] = "worm"
 
-    @model_validator(mode="after")
-    def _is_a_worm(self) -> Self:
+    @rule
+    def _is_a_worm(self) -> Iterator[str]:
         geometry = ("module", "starts", "diameter")
         given = [key for key in geometry if getattr(self, key) is not None]
         if self.lead_angle is not None and given:
-            raise ValueError(f"has lead_angle and {', '.join(given)}, which say the same; give one or the other")
+            yield f"has lead_angle and {', '.join(given)}, which say the same; give one or the other"
         if self.lead_angle is None and len(given) < len(geometry):
             lacking = ", ".join(key for key in geometry if key not in given)
-            raise ValueError(f"lacks {lacking if given else 'lead_angle, or module, starts and diameter'}; add it")
+            yield f"lacks {lacking if given else 'lead_angle, or module, starts and diameter'}; add it"
         if (self.friction_angle is None) == (self.friction_coefficient is None):
             says = "lacks" if self.friction_angle is None else "has both"
-            raise ValueError(f"{says} friction_angle and friction_coefficient; give one of them")
+            yield f"{says} friction_angle and friction_coefficient; give one of them"
         g, r = self.angles()
         if not g + r < 0.5 * math.pi:
-            raise ValueError(
+            yield (
                 f"has a lead angle of {math.degrees(g):.4g} deg and a friction angle of {math.degrees(r):.4g} deg; "
                 "their sum must be below 90 deg, or nothing could drive it"
             )
-        return self
 
     def angles(self) -> tuple[float, float]:
         """(lead angle, friction angle) [rad]."""

@@ -2,13 +2,14 @@
 
 import itertools
 import math
-from typing import Annotated, Self
+from collections.abc import Iterator
+from typing import Annotated
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .. import _core
 from ..inputs.breakpoints import RESOLUTION, check_apart, check_rising
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, Limit, NotNegative, Number, Positive, UpToOne
 from ..reproducible import total
 
@@ -36,27 +37,22 @@ class MeshStiffness(Part):
     ] = ()
     """in place of contact_ratio and fewer_pairs: from which share of a mesh period on, and the factor on the stiffness"""
 
-    @model_validator(mode="after")
-    def _is_one_form(self) -> Self:
+    @rule
+    def _is_one_form(self) -> Iterator[str]:
         by_ratio = (self.contact_ratio, self.fewer_pairs)
         if bool(self.pairs) == any(value is not None for value in by_ratio):
-            raise ValueError("needs contact_ratio and fewer_pairs, or pairs in place of both")
+            yield "needs contact_ratio and fewer_pairs, or pairs in place of both"
         if not self.pairs and None in by_ratio:
-            raise ValueError("has one of contact_ratio and fewer_pairs; give both")
+            yield "has one of contact_ratio and fewer_pairs; give both"
         if self.contact_ratio is not None and self.contact_ratio % 1.0 == 0.0:
-            raise ValueError(
-                f"has a contact_ratio of {self.contact_ratio:g}, with which the number of pairs never changes; leave the table out"
-            )
+            yield f"has a contact_ratio of {self.contact_ratio:g}, with which the number of pairs never changes; leave the table out"
         shares = [share for share, _ in self.pairs]
         if shares and shares[0] != 0.0:
-            raise ValueError(f"has pairs that begin at {shares[0]:g}; the first must be 0, the begin of the period")
+            yield f"has pairs that begin at {shares[0]:g}; the first must be 0, the begin of the period"
         check_rising(shares, "shares")
         if shares and shares[-1] >= 1.0:
-            raise ValueError(
-                f"has pairs that begin at {shares[-1]:g}; the last must begin below 1, the end of the period"
-            )
+            yield f"has pairs that begin at {shares[-1]:g}; the last must begin below 1, the end of the period"
         check_apart((*shares, 1.0), "shares")
-        return self
 
     def segments(self) -> tuple[tuple[float, float], ...]:
         """(share of a mesh period at which it begins, factor) of each segment, from 0 on."""

@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Any, Literal, Self
 
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
 from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.core_parameters import MotorFields, ShaftMotorFields
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Current,
     Number,
@@ -68,11 +69,10 @@ class MotorLimits(MotorHeat):
     max_inertia_ratio: Annotated[Number, Positive] | None = None
     """largest inertia of the load, gearbox included, at the motor relative to the rotor's inertia"""
 
-    @model_validator(mode="after")
-    def _one_resistance(self) -> Self:
+    @rule
+    def _one_resistance(self) -> Iterator[str]:
         if self.thermal_resistance is not None and self.thermal_parts is not None:
-            raise ValueError("has thermal_resistance and both of its parts, which say the same; leave it out")
-        return self
+            yield "has thermal_resistance and both of its parts, which say the same; leave it out"
 
     @property
     def thermal_parts(self) -> tuple[float, float] | None:
@@ -161,36 +161,33 @@ class Motor(MotorFields):
 
     _note_is_about_a_key = field_validator("note")(classmethod(note_is_about))
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    @rule
+    def _complete(self) -> Iterator[str]:
         self._check_stepper()
         if self.kind == "dc":
             self._check_line()
             self._take_rated_point()
             for key in ("rated_speed", "electrical_time_constant", "armature_voltage_constant"):
                 if getattr(self, key) is None:
-                    raise ValueError(
-                        f'lacks {key}, which a motor of kind "dc" needs; or give stall_torque and no_load_speed'
-                    )
+                    yield f'lacks {key}, which a motor of kind "dc" needs; or give stall_torque and no_load_speed'
         else:
             what = {"torque_source": "torque_source", "stepper": "stepper"}.get(self.kind, "synchronous motor")
             self._refuse(DC_KEYS, f"of no use to a {what}")
         if self.kind == "synchronous":
             for key in ("winding", "dc_voltage"):
                 if getattr(self, key) is None:
-                    raise ValueError(f'lacks {key}, which a motor of kind "synchronous" needs')
+                    yield f'lacks {key}, which a motor of kind "synchronous" needs'
             if "rated_torque" not in self.model_fields_set:
-                raise ValueError('lacks rated_torque, which a motor of kind "synchronous" needs')
+                yield 'lacks rated_torque, which a motor of kind "synchronous" needs'
         if self.winding is not None:
             self._check_synchronous(self.winding.phase_values())
         elif self.dc_voltage is not None:
-            raise ValueError("has a dc_voltage, which only a winding needs; give motor.winding too, or leave it out")
+            yield "has a dc_voltage, which only a winding needs; give motor.winding too, or leave it out"
         if self.voltage_limit is not None:
             if self.rated_voltage is None:
-                raise ValueError("has a voltage_limit, which also needs rated_voltage")
+                yield "has a voltage_limit, which also needs rated_voltage"
             if self.limits is not None and self.limits.max_voltage is not None:
-                raise ValueError("has voltage_limit and limits.max_voltage, which say the same of a DC motor; give one")
-        return self
+                yield "has voltage_limit and limits.max_voltage, which say the same of a DC motor; give one"
 
     def _check_stepper(self) -> None:
         """A stepper has its own keys."""
@@ -465,10 +462,7 @@ class ShaftMotor(ShaftMotorFields, Motor):
         winding = None if self.winding is None else self.winding.model_copy(update=none)
         return self.model_copy(update={"torque_limit": None, "winding": winding})
 
-    @model_validator(mode="after")
-    def _limit_fits_kind(self) -> Self:
+    @rule
+    def _limit_fits_kind(self) -> Iterator[str]:
         if self.torque_limit is not None and self.kind != "torque_source":
-            raise ValueError(
-                f'has a torque_limit, which a motor of kind "{self.kind}" does not; give {"voltage_limit" if self.kind == "dc" else "dc_voltage"}, or the kind "torque_source"'
-            )
-        return self
+            yield f'has a torque_limit, which a motor of kind "{self.kind}" does not; give {"voltage_limit" if self.kind == "dc" else "dc_voltage"}, or the kind "torque_source"'

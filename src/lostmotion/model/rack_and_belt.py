@@ -1,10 +1,12 @@
 """Racks with their pinions, and belts with their pulleys."""
 
 import math
+from collections.abc import Iterator
 from typing import Annotated, Self
 
 from pydantic import Field, model_validator
 
+from ..inputs.part import rule
 from ..inputs.quantities import Angle, Force, Length, Limit, Positive, Whole
 from ..reproducible import cos
 from .linear import LinearDrive, Placed, one_way
@@ -68,21 +70,20 @@ class BeltData(LinearDrive):
     free_lengths: Annotated[tuple[Annotated[Length, Positive], ...], Field(min_length=1, max_length=10)] | None = None
     """lengths of the strands between pulley and slide that carry together: stiffness = c_sp (1/L_1 + 1/L_2 ...)"""
 
-    @model_validator(mode="after")
-    def _is_a_belt(self) -> Self:
+    @rule
+    def _is_a_belt(self) -> Iterator[str]:
         ways = {"diameter": ("pulley_diameter",), "teeth": ("teeth", "pitch"), "travel": ("travel_per_turn",)}
         one_way(self, ways)
         if (self.specific_stiffness is None) != (self.free_lengths is None):
-            raise ValueError("has one of specific_stiffness and free_lengths; the stiffness of the belt needs both")
+            yield "has one of specific_stiffness and free_lengths; the stiffness of the belt needs both"
         for key in ("stiffness", "stiffness_curve"):
             if self.free_lengths is not None and getattr(self, key) is not None:
-                raise ValueError(f"has {key} and specific_stiffness, which say the same; give one")
+                yield f"has {key} and specific_stiffness, which say the same; give one"
         if self._goes_slack() and (len(lengths := self.free_lengths or ()) != 2 or lengths[0] != lengths[1]):
-            raise ValueError(
+            yield (
                 f"has a preload and free_lengths {list(lengths)}; a preload takes two strands of the same length, one of which goes "
                 "slack; give them, or a stiffness_curve"
             )
-        return self
 
     def _goes_slack(self) -> bool:
         return self.preload > 0.0 and self.free_lengths is not None

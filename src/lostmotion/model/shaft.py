@@ -1,6 +1,7 @@
 """A shaft of a drive train: inertia, friction and drag."""
 
 import itertools
+from collections.abc import Iterator
 from functools import lru_cache
 from typing import Annotated, Any, Literal, Self
 
@@ -9,7 +10,7 @@ from pydantic import Field, model_validator
 from .. import _core
 from ..inputs import core_parameters
 from ..inputs.breakpoints import check_apart, check_rising
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import NotNegative, Number, Positive, Speed, Torque
 from .end_stops import ShaftEndStops
 
@@ -70,18 +71,15 @@ class DragCurve(Part):
     """torque at negative speeds over that at positive ones"""
     kind: Literal["curve"] = "curve"
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
         check_points(self.speeds, self.torques)
         if self.torques[0] != 0.0:
-            raise ValueError(f"has a torque of {self.torques[0]} N*m at rest; what holds at rest is friction_torque")
+            yield f"has a torque of {self.torques[0]} N*m at rest; what holds at rest is friction_torque"
         if self.beyond == "extend" and self.torques[-1] < self.torques[-2]:
-            raise ValueError(
-                'falls at its end, so that it would drive at high speed; add a point, or give beyond = "hold", which keeps the last torque'
-            )
+            yield 'falls at its end, so that it would drive at high speed; add a point, or give beyond = "hold", which keeps the last torque'
         if not any(self.torques):
-            raise ValueError("has no torque at any speed; leave drag out")
-        return self
+            yield "has no torque at any speed; leave drag out"
 
     def core(self) -> _core.TorsionCurve:
         points = list(zip(self.speeds, self.torques, strict=True))
@@ -118,13 +116,10 @@ class EddyCurrentDrag(Part):
     """by which they depart from it at most; left out, 0.1 % of the peak torque"""
     kind: Literal["eddy_current"]
 
-    @model_validator(mode="after")
-    def _takes_few_lines(self) -> Self:
+    @rule
+    def _takes_few_lines(self) -> Iterator[str]:
         if len(self._ends()) > MOST_POINTS:
-            raise ValueError(
-                f"has an error of {self._error():g} N*m, which takes more than {MOST_POINTS} straight lines; give a larger one"
-            )
-        return self
+            yield f"has an error of {self._error():g} N*m, which takes more than {MOST_POINTS} straight lines; give a larger one"
 
     def _error(self) -> float:
         return SHARE * self.peak_torque if self.error is None else self.error

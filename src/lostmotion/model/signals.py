@@ -6,7 +6,7 @@ import bisect
 import itertools
 import math
 from collections import deque
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from functools import lru_cache
 from typing import Annotated, Any, ClassVar, Generic, Self, TypeVar
 
@@ -17,7 +17,7 @@ from .. import _core
 from ..inputs import core_parameters
 from ..inputs.breakpoints import check_rising
 from ..inputs.core_parameters import V
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Angle,
     Force,
@@ -103,16 +103,15 @@ class Samples(Part, Generic[V]):
     times: tuple[Time, ...]  #: instants, rising from 0 or later
     values: tuple[V, ...]  #: value at each instant
 
-    @model_validator(mode="after")
-    def _fit_together(self) -> Self:
+    @rule
+    def _fit_together(self) -> Iterator[str]:
         if len(self.times) != len(self.values):
-            raise ValueError(f"has {len(self.times)} times and {len(self.values)} values; give as many of each")
+            yield f"has {len(self.times)} times and {len(self.values)} values; give as many of each"
         if len(self.times) < 2:
-            raise ValueError("has fewer than two points; give at least two, or use mean")
+            yield "has fewer than two points; give at least two, or use mean"
         if self.times[0] < 0.0:
-            raise ValueError(f"begins at {self.times[0]} s; times must not be negative")
+            yield f"begins at {self.times[0]} s; times must not be negative"
         check_rising(self.times, "times")
-        return self
 
     def breakpoints(self) -> list[Breakpoint]:
         values = [float(v) for v in self.values]  # type: ignore[arg-type]
@@ -143,14 +142,13 @@ class TimeFunction(Part, Generic[V]):
         data = scalar(data)
         return {"mean": data} if isinstance(data, str) or is_number(data) else data
 
-    @model_validator(mode="after")
-    def _amplitude_and_frequency(self) -> Self:
+    @rule
+    def _amplitude_and_frequency(self) -> Iterator[str]:
         if (self.amplitude is None) != (self.frequency is None):
             missing = "frequency" if self.frequency is None else "amplitude"
-            raise ValueError(f"lacks {missing}; amplitude and frequency belong together")
+            yield f"lacks {missing}; amplitude and frequency belong together"
         if self.phase != 0.0 and self.amplitude is None:
-            raise ValueError("has a phase but no sine; give amplitude and frequency too")
-        return self
+            yield "has a phase but no sine; give amplitude and frequency too"
 
     def sine_list(self) -> list[tuple[float, float, float]]:
         """(amplitude, frequency [Hz], phase [rad]) of each sine."""
@@ -309,16 +307,13 @@ class GivenSpeed(Signal[V], Generic[V]):
 
     unit: ClassVar[str] = "rad/s"
 
-    @model_validator(mode="after")
-    def _is_continuous(self) -> Self:
+    @rule
+    def _is_continuous(self) -> Iterator[str]:
         lines = self.breakpoint_list()
         for (begin, value, slope), (end, after, _) in itertools.pairwise(lines):
             before = value + slope * (end - begin)
             if not math.isclose(before, after, rel_tol=1e-9, abs_tol=1e-9 * max(abs(v) for _, v, _ in lines)):
-                raise ValueError(
-                    f"jumps at {end:g} s from {before:.6g} to {after:.6g} {self.unit}, which takes an infinite acceleration; give ramps"
-                )
-        return self
+                yield f"jumps at {end:g} s from {before:.6g} to {after:.6g} {self.unit}, which takes an infinite acceleration; give ramps"
 
     def acceleration(self) -> AccelerationSignal:
         """Its time derivative [rad/s²]."""

@@ -16,14 +16,14 @@ the DC motor of (2) where command 1 is the voltage u_R and 1 of m_D the torque M
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from typing import Annotated, Any, NamedTuple, Self
+from typing import Annotated, Any, NamedTuple
 
 import numpy as np
 from pydantic import Field, model_validator
 
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Current,
     Inductance,
@@ -217,16 +217,15 @@ class Winding(Part):
                 raise ValueError(_readings(key, table[key]))
         return table
 
-    @model_validator(mode="after")
-    def _complete(self) -> Self:
+    @rule
+    def _complete(self) -> Iterator[str]:
         self._check_poles()
         for forms, needed in ((RESISTANCE, True), (CONTINUOUS, False), (LARGEST, False)):
             given = [key for key in forms.factors if getattr(self, key) is not None]
             if len(given) > 1 or (needed and not given):
-                raise ValueError(f"needs {'one' if needed else 'at most one'} of {', '.join(forms.factors)}")
+                yield f"needs {'one' if needed else 'at most one'} of {', '.join(forms.factors)}"
         self._inductances()
         self._check_constants()
-        return self
 
     def _check_poles(self) -> None:
         if self.pole_pairs is None and self.poles is None:

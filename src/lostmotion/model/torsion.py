@@ -1,14 +1,13 @@
 """The torsion of a gearbox: stiffness, backlash and hysteresis."""
 
+from collections.abc import Iterator
 from typing import Annotated, Literal, Self
-
-from pydantic import model_validator
 
 from .. import _core
 from ..errors import InputError
 from ..inputs.breakpoints import check_apart, check_rising
 from ..inputs.core_parameters import TorsionCurveFields
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Share, Stiffness, UpToOne, argument
 
 
@@ -78,12 +77,11 @@ class TorsionCurve(TorsionCurveFields, Elastic):
 
     kind: Literal["curve"] = "curve"
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
         check_segments(self.slopes, self.breaks, "torque")
         if self.backlash > 0.0 and self.preload > 0.0:
-            raise ValueError("has backlash and preload; a preload removes the backlash, so give only one")
-        return self
+            yield "has backlash and preload; a preload removes the backlash, so give only one"
 
     def core(self) -> _core.TorsionCurve:
         """The curve of the solver."""
@@ -130,13 +128,12 @@ class Rigid(Part):
         """Whether it has backlash."""
         return self.backlash > 0.0
 
-    @model_validator(mode="after")
-    def _is_whole(self) -> Self:
+    @rule
+    def _is_whole(self) -> Iterator[str]:
         if self.strikes and self.restitution is None:
-            raise ValueError("has rigid flanks with backlash; give their restitution, 0 to 1, or a stiffness")
+            yield "has rigid flanks with backlash; give their restitution, 0 to 1, or a stiffness"
         if not self.strikes and self.restitution is not None:
-            raise ValueError("has a restitution but no backlash; give both or none")
-        return self
+            yield "has a restitution but no backlash; give both or none"
 
 
 class Hysteresis(Part):

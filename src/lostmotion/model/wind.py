@@ -1,12 +1,13 @@
 """Wind on a load: a torque with the spectrum of the gusts, seeded, so that it is the same each time."""
 
 import math
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field
 
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Frequency,
     Length,
@@ -47,16 +48,13 @@ class Wind(Part):
         """Torque [N·m] that the gusts are about."""
         return 0.0
 
-    @model_validator(mode="after")
-    def _has_lines(self) -> Self:
+    @rule
+    def _has_lines(self) -> Iterator[str]:
         points = self.duration * self.max_frequency * self.points_per_period
         if points > MAX_POINTS:
-            raise ValueError(
-                f"asks for {points:.3g} points, more than {MAX_POINTS}; lower max_frequency or the duration"
-            )
+            yield f"asks for {points:.3g} points, more than {MAX_POINTS}; lower max_frequency or the duration"
         if self.lines().size == 0:
-            raise ValueError("has no line of the spectrum up to max_frequency; raise it to 1/duration at least")
-        return self
+            yield "has no line of the spectrum up to max_frequency; raise it to 1/duration at least"
 
     def lines(self) -> np.ndarray:
         """Frequencies f_k [Hz]."""
@@ -88,15 +86,12 @@ class WindOfTable(Wind):
     densities: tuple[Annotated[float, Unit("N^2*m^2/Hz"), Positive], ...]  #: one-sided [(N·m)²/Hz], at each frequency
     kind: Literal["table"]
 
-    @model_validator(mode="after")
-    def _fits_together(self) -> Self:
+    @rule
+    def _fits_together(self) -> Iterator[str]:
         if len(self.frequencies) != len(self.densities):
-            raise ValueError(
-                f"has {len(self.frequencies)} frequencies and {len(self.densities)} densities; give as many of each"
-            )
+            yield f"has {len(self.frequencies)} frequencies and {len(self.densities)} densities; give as many of each"
         if np.any(np.diff(self.frequencies) <= 0.0):
-            raise ValueError("has frequencies that do not rise; sort them, and give each once")
-        return self
+            yield "has frequencies that do not rise; sort them, and give each once"
 
     def spectrum(self, frequency: np.ndarray) -> np.ndarray:
         inside = (frequency >= self.frequencies[0]) & (frequency <= self.frequencies[-1])
@@ -165,13 +160,10 @@ class Kaimal(WindOnArea):
     roughness_length: Annotated[Length, NotNegative] = 0.03  #: z_0; 0.03 m open country
     kind: Literal["kaimal"]
 
-    @model_validator(mode="after")
-    def _above_the_roughness(self) -> Self:
+    @rule
+    def _above_the_roughness(self) -> Iterator[str]:
         if not 0.0 < self.roughness_length < self.height:
-            raise ValueError(
-                f"has roughness_length = {self.roughness_length:g} m, which must lie between 0 and its height, {self.height:g} m"
-            )
-        return self
+            yield f"has roughness_length = {self.roughness_length:g} m, which must lie between 0 and its height, {self.height:g} m"
 
     def gusts(self, frequency: np.ndarray) -> np.ndarray:
         friction = KARMAN * self.speed / log(self.height / self.roughness_length)

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Annotated, Any, Protocol, Self
+from collections.abc import Iterator
+from typing import TYPE_CHECKING, Annotated, Any, Protocol
 
 import numpy as np
-from pydantic import model_validator
 
 from ... import _core
 from ...control.continuous import ContinuousController
 from ...control.controller import Controller
 from ...data_sheets.components import ACCESSORIES
-from ...inputs.part import Part
+from ...inputs.part import Part, rule
 from ...inputs.quantities import Positive, Time
 from ...model.train import DriveTrain
 
@@ -37,13 +37,12 @@ class SimulationTable(Part):
     duration: Annotated[Time, Positive]
     sample_interval: Annotated[Time, Positive]
 
-    @model_validator(mode="after")
-    def _not_too_many(self) -> Self:
+    @rule
+    def _not_too_many(self) -> Iterator[str]:
         if self.sample_interval > self.duration:
-            raise ValueError(f"has a sample_interval of {self.sample_interval} s, longer than its duration")
+            yield f"has a sample_interval of {self.sample_interval} s, longer than its duration"
         if self.duration / self.sample_interval > MAX_SAMPLES:
-            raise ValueError(f"asks for more than {MAX_SAMPLES:.0e} samples; lengthen sample_interval")
-        return self
+            yield f"asks for more than {MAX_SAMPLES:.0e} samples; lengthen sample_interval"
 
     @property
     def samples(self) -> int:
