@@ -19,7 +19,6 @@ from ..model.shaft_ratio import tied, turns
 from ..model.signals import ForceSignal, TorqueSignal, core_signal
 from ..model.torsion import Elastic, Rigid
 from ..response.linear import LinearModel, train_model
-from ..simulation.forms.initial_state import start_values
 from ..simulation.forms.train_tables import TrainInitial
 from ..simulation.scenario.requirements import need_free_motion
 from ..simulation.scenario.scenario import Scenario
@@ -193,20 +192,23 @@ def regimes(axis: Axis) -> list[Regime]:
     """The regimes that an axis is commissioned in: each characteristic piece of its main gear, and what may stick in it."""
     found: list[Regime] = []
     for name, meaning, state, wanted in _points(axis):
-        model = model_at(axis, state)
+        model = model_at(axis.scenario, state)
         if all(model.contacts.get(contact) == mode for contact, mode in wanted.items()):
             found.append(Regime.of(axis, name, meaning, model))
     return found
 
 
-def model_at(axis: Axis, state: TrainInitial) -> LinearModel:
-    """The linear model of the regime of a state."""
-    scenario = axis.scenario
+def case_at(scenario: Scenario, state: TrainInitial | None = None) -> _core.Case:
+    """A scenario without commands and loads, in a state or at its start, as the core takes it."""
     core = scenario.core()
-    values, capacities = start_values(axis.train, state), state.of_all("hysteresis_capacities")
-    ramps = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
-    case = _core.Case(core, inputs=ramps, start=values, hysteresis_capacities=capacities)
-    return train_model(axis.train, core, **_core.linearize_at(case, 0.0))
+    zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
+    capacities = scenario.capacities(state)
+    return _core.Case(core, inputs=zeros, start=scenario.start(state), hysteresis_capacities=capacities)
+
+
+def model_at(scenario: Scenario, state: TrainInitial) -> LinearModel:
+    """The linear model of the regime of a state."""
+    return train_model(scenario.train(), scenario.core(), **_core.linearize_at(case_at(scenario, state), 0.0))
 
 
 def _points(axis: Axis) -> Iterator[tuple[str, str, TrainInitial, dict[str, int]]]:

@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -170,7 +170,15 @@ def hunting_certificate(
     points = _map(contact, proof, largest)
     found = _with_proof(proof, contact.name, reached, is_reached=fades or abs(reached) <= proof.largest)
     fixed = tuple(_fixed_points(contact, points)) if contact.excess > 0.0 else ()
-    return replace(found, map=_dataset(contact, points, found.verdict, train), fixed_points=fixed)
+    good = [(e, i) for e, i in points if not i.reason]
+    columns = {
+        "image": [i.middle for _, i in good],
+        "slip_time": [0.5 * sum(i.slip) for _, i in good],
+        "stuck_time": [0.5 * sum(i.stuck) for _, i in good],
+    }
+    return replace(
+        found, map=_dataset(contact, [e for e, _ in good], columns, found.verdict, train), fixed_points=fixed
+    )
 
 
 def _with_proof(proof: Proof, contact: str, reached: float, *, is_reached: bool) -> HuntingCertificate:
@@ -220,19 +228,12 @@ def certified(axis: Axis, rests: Callable[[], bool], largest_error: float | None
 
 def _sampled_map(contact: SampledSlip, proof: Proof, train: Scenario) -> xarray.Dataset | None:
     """Error left by a slip without the steps of the encoder, about a band; None without one."""
-    import xarray as xr
-
     if proof.band is None:
         return None
-    unit, errors = _unit(train), np.linspace(0.25 * proof.band[0], 1.5 * proof.band[1], SAMPLED_POINTS)
+    errors = np.linspace(0.25 * proof.band[0], 1.5 * proof.band[1], SAMPLED_POINTS)
     image = map_without_steps(contact, errors)
     shown = np.isfinite(image)
-    about = {"units": unit, "long_name": "error left after the slip"}
-    return xr.Dataset(
-        {"image": ("error", image[shown], about)},
-        coords={"error": ("error", errors[shown], {"units": unit, "long_name": "error at the break-away"})},
-        attrs={"contact": contact.name, "verdict": proof.verdict},
-    )
+    return _dataset(contact, errors[shown], {"image": image[shown]}, proof.verdict, train)
 
 
 def _unit(train: Scenario) -> str:
@@ -329,18 +330,21 @@ def _fixed_point(contact: StickSlip, a: float, b: float, at_a: float, at_b: floa
     return FixedPoint(error, sum(found.slip) + sum(found.stuck), (slope - 1.0) ** 2)
 
 
-def _dataset(contact: StickSlip, points: list[tuple[float, Image]], verdict: str, train: Scenario) -> xarray.Dataset:
+def _dataset(
+    contact: StickSlip | SampledSlip, errors: Any, columns: Mapping[str, Any], verdict: str, train: Scenario
+) -> xarray.Dataset:
+    """Points of the map as a dataset over the error at the break-away."""
     import xarray as xr
 
     unit = _unit(train)
-    good = [(e, i) for e, i in points if not i.reason]
-    columns = {
-        "image": ([i.middle for _, i in good], unit, "error left after the slip"),
-        "slip_time": ([0.5 * sum(i.slip) for _, i in good], "s", "duration of the slip"),
-        "stuck_time": ([0.5 * sum(i.stuck) for _, i in good], "s", "time until the contact breaks away again"),
+    about = {
+        "image": (unit, "error left after the slip"),
+        "slip_time": ("s", "duration of the slip"),
+        "stuck_time": ("s", "time until the contact breaks away again"),
     }
-    return xr.Dataset(
-        {name: ("error", values, {"units": u, "long_name": text}) for name, (values, u, text) in columns.items()},
-        coords={"error": ("error", [e for e, _ in good], {"units": unit, "long_name": "error at the break-away"})},
-        attrs={"contact": contact.name, "verdict": verdict},
-    )
+    data = {
+        name: ("error", values, dict(zip(("units", "long_name"), about[name], strict=True)))
+        for name, values in columns.items()
+    }
+    coordinates = {"error": ("error", errors, {"units": unit, "long_name": "error at the break-away"})}
+    return xr.Dataset(data, coords=coordinates, attrs={"contact": contact.name, "verdict": verdict})

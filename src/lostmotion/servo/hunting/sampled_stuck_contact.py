@@ -18,17 +18,14 @@ import numpy as np
 from ... import _core
 from ...control.controller import Controller
 from ...control.loops import FirstOrderCurrent, IdealCurrent
-from ...errors import InputError
 from ...model.shaft_ratio import turns
 from ...response.linear import LinearModel
-from ...simulation.forms.initial_state import start_values
 from ...simulation.forms.train_tables import TrainInitial
-from ..linear_regimes import Axis, model_at
+from ..linear_regimes import Axis
 from .hunting_decision import FOREVER
-from .stuck_contact import NONE, AtRestError, UndecidableError, only_contact, others
+from .stuck_contact import NONE, AtRestError, UndecidableError, only_contact, others, slow_regimes
 
 ROUNDING = 1e-15  # of a number of encoder steps, by which its computation may change it
-SLIP_SPEED = 1e-9  # [rad/s] or [m/s], at which the matrices of the slip are taken
 DOUBLINGS = 40  # of the time until what is not the ramp of the integrator has settled
 SETTLED = 1e-9  # relative change of the ramp from frame to frame
 MOST_SETTLING = 20_000  # ticks
@@ -150,22 +147,13 @@ class SettledStuckState:
 def sampled_slip(axis: Axis) -> SampledSlip:
     """The matrices of an axis with a sampled position controller.
 
-    Raises InputError: there is no such controller.
     Raises UndecidableError: the axis has other contacts, soft gears, or a controller that is not linear within its
         limits.
     Raises AtRestError: a limit of the controller keeps it from freeing the contact.
     """
-    controller, train = axis.controller, axis.train
-    if controller.reference.kind != "position":
-        raise InputError(
-            f"{controller.reference.kind}; the map is that of a position controller",
-            f"controllers.{axis.motor}.reference.kind",
-        )
-    if reasons := [*others(train), *_nonlinear(axis)]:
+    if reasons := [*others(axis.train), *_nonlinear(axis)]:
         raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")
-    core, state = axis.scenario.core(), TrainInitial()
-    shaft, breakaway = only_contact(train, core, start_values(train, state), state.of_all("hysteresis_capacities"))
-    return _assembled(axis, _plant_of(axis, shaft, breakaway))
+    return _assembled(axis, _plant_of(axis, *only_contact(axis.scenario, TrainInitial())))
 
 
 def _nonlinear(axis: Axis) -> Any:
@@ -188,13 +176,7 @@ def _nonlinear(axis: Axis) -> Any:
 
 def _plant_of(axis: Axis, shaft: str, breakaway: float) -> RigidPlant:
     train = axis.train
-    ratios = {name: turns(train, name, shaft) for name in train.shafts}
-    still, forward, reverse = (
-        model_at(axis, TrainInitial(speeds={n: w * i for n, i in ratios.items() if i is not None and w}))
-        for w in (0.0, SLIP_SPEED, -SLIP_SPEED)
-    )
-    if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
-        raise UndecidableError("it slips forward otherwise than in reverse")
+    still, forward, reverse = slow_regimes(axis.scenario, shaft)
     row = np.eye(len(forward.states))[forward.states.index(train.variable(shaft, "speed"))]
     friction = 0.5 * (forward.rate - reverse.rate)
     along = friction / (row @ friction)

@@ -10,7 +10,7 @@ error.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -19,11 +19,11 @@ import numpy as np
 from ... import _core
 from ...errors import InputError
 from ...model.shaft_ratio import turns
-from ...model.signals import core_signal
 from ...model.torsion import Rigid
-from ...response.linear import LinearModel, train_model
+from ...response.linear import LinearModel
 from ...simulation.forms.train_tables import TrainInitial
 from ...simulation.scenario.scenario import Scenario
+from ..linear_regimes import case_at, model_at
 from .limit_cycles import UndrivenLoop
 
 if TYPE_CHECKING:
@@ -87,10 +87,8 @@ def stick_slip(scenario: Scenario) -> StickSlip:
         raise UndecidableError(f"the firmware of {motor} is no linear law")
     if reasons := list(others(scenario.train())):
         raise UndecidableError(f"the slip is not one linear regime: it has {', '.join(reasons)}")
-    shaft, breakaway = only_contact(scenario.train(), loop.core, scenario.start(), scenario.capacities())
-    still, forward, reverse = (_model(loop, shaft, way * SLIP_SPEED) for way in (0.0, 1.0, -1.0))
-    if not np.allclose(forward.A, reverse.A, rtol=NONE, atol=0.0):
-        raise UndecidableError("it slips forward otherwise than in reverse")
+    shaft, breakaway = only_contact(scenario)
+    still, forward, reverse = slow_regimes(scenario, shaft)
     if [m.contacts[scenario.train().variable(shaft, "contact")] for m in (still, forward, reverse)] != [0, 1, -1]:
         raise UndecidableError("at small speeds the contact does not slip as one linear regime")
     return _Builder(loop, motor, shaft, still, forward, reverse).build(breakaway)
@@ -112,16 +110,12 @@ def _motor(scenario: Scenario) -> str:
     return motor
 
 
-def only_contact(
-    train: DriveTrain, core: _core.Train, start: Mapping[str, float], capacities: Mapping[str, float]
-) -> tuple[str, float]:
-    """Shaft of the only dry contact, and the torque that it holds.
+def only_contact(scenario: Scenario, state: TrainInitial | None = None) -> tuple[str, float]:
+    """Shaft of the only dry contact, and the torque that it holds in a state, or at the start of the scenario.
 
     Raises UndecidableError: there is none, or there are several.
     """
-    zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in core.input_names()]
-    case = _core.Case(core, inputs=zeros, start=start, hysteresis_capacities=capacities)
-    contacts = _core.explain_at(case, 0.0)["contacts"]
+    contacts = _core.explain_at(case_at(scenario, state), 0.0)["contacts"]
     dry = [contact for contact in contacts if math.isfinite(contact["capacity_forward"])]
     if not dry:
         raise UndecidableError("it has no dry contact that could stick")
@@ -130,7 +124,7 @@ def only_contact(
             f"it has {len(dry)} dry contacts, {', '.join(contact['name'] for contact in dry)}, and the map is that of one"
         )
     name, ahead, back = (dry[0][key] for key in ("name", "capacity_forward", "capacity_backward"))
-    shaft = train.shaft_of(name, "contact")
+    shaft = scenario.train().shaft_of(name, "contact")
     if not shaft or ahead != back:
         raise UndecidableError(f"{name} is not the dry friction of a shaft, the same in both directions")
     if ahead == 0.0:
@@ -164,16 +158,19 @@ def others(train: DriveTrain) -> Iterator[str]:
             yield key
 
 
-def _model(loop: UndrivenLoop, shaft: str, speed: float) -> LinearModel:
-    """The regime in which the shaft turns with a small speed, and all that gears join to it."""
-    train = loop.scenario.train()
-    ratios = {name: turns(train, name, shaft) for name in train.shafts}
-    speeds = {name: speed * i for name, i in ratios.items() if i is not None and speed != 0.0}
-    start = loop.scenario.start(TrainInitial(speeds=speeds))
-    zeros = [core_signal([(0.0, 0.0, 0.0)]) for _ in loop.core.input_names()]
-    capacities = loop.scenario.capacities()
-    case = _core.Case(loop.core, inputs=zeros, start=start, hysteresis_capacities=capacities)
-    return train_model(train, loop.core, **_core.linearize_at(case, 0.0))
+def slow_regimes(scenario: Scenario, shaft: str) -> tuple[LinearModel, ...]:
+    """Regimes in which a shaft, with all that gears join to it, is at rest, and turns slowly forward and in reverse.
+
+    Raises UndecidableError: it slips forward otherwise than in reverse.
+    """
+    ratios = {name: turns(scenario.train(), name, shaft) for name in scenario.train().shafts}
+    found = []
+    for speed in (0.0, SLIP_SPEED, -SLIP_SPEED):
+        speeds = {name: speed * i for name, i in ratios.items() if i is not None and speed != 0.0}
+        found.append(model_at(scenario, TrainInitial(speeds=speeds)))
+    if not np.allclose(found[1].A, found[2].A, rtol=NONE, atol=0.0):
+        raise UndecidableError("it slips forward otherwise than in reverse")
+    return tuple(found)
 
 
 class _Builder:
