@@ -9,7 +9,6 @@ import sys
 from importlib.metadata import version
 from pathlib import Path
 
-import baseline
 import batches
 import build_times
 import closed_loops
@@ -70,7 +69,6 @@ def main() -> None:
         f"lostmotion {version('lostmotion')}, {', '.join(f'{m} {version(m)}' for m in PEERS)}.",
     )
     one_run.section(report, scenario, programs)
-    baseline.section(report, build, _instruction_set.builds())
     build_times.section(report)
     trains.section(report, programs)
     trains.sizes(report, programs)
