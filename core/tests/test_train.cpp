@@ -144,7 +144,7 @@ TEST_CASE("a regime in a kernel's places has the coefficients of the layout, and
         for (const ContactPlace& c : a.places().contacts)
             if (c.one_way) key.modes[&c - a.places().contacts.data()] = -1;
         const Regime r = a.build(key);
-        const auto sparse = SparseRegimes(a).make(key);
+        const auto sparse = SparseRegimes(a).share(key);
         REQUIRE(sparse->guards.size() == r.guards.size());
         Instant x;
         x.reach(at);

@@ -16,7 +16,7 @@ class Few {
  public:
     static_assert(std::is_trivially_copyable_v<T> && few % 4 == 0);
 
-    Few() = default;
+    Few() { std::fill_n(few_, few, T{}); }
     Few(const Few& o) { *this = o; }
     Few(Few&& o) noexcept { *this = std::move(o); }
     Few& operator=(const Few& o) {
@@ -27,7 +27,12 @@ class Few {
         return *this;
     }
     Few& operator=(Few&& o) noexcept {
+        if (many_ == nullptr && o.many_ == nullptr) {
+            std::memcpy(few_, o.few_, sizeof few_);
+            return *this;
+        }
         if (o.many_ == nullptr) return *this = std::as_const(o);
+        if (many_ == nullptr) std::fill_n(o.few_, few, T{});
         std::swap(size_, o.size_);
         std::swap(room_, o.room_);
         std::swap(many_, o.many_);
@@ -86,7 +91,7 @@ class Few {
         size_ = size;
     }
 
-    T few_[few]{};               // where there are not many
+    T few_[few];                 // where there are not many
     std::unique_ptr<T[]> many_;  // as far as size_
     std::size_t size_ = 0, room_ = 0;
 };

@@ -188,8 +188,12 @@ struct Regime {
     std::vector<Row> motion;           // of each shaft: the net torque, then its acceleration
     std::vector<Row> loss;             // of each gear: what acts on the contact of its input shaft [N m]
     std::vector<MasslessSpeed> massless;
-    Flags at_rest;  // contacts whose speeds this regime keeps at zero
+    // By the modes alone:
     Ties ties;
+    Flags kept_at_rest;   // contacts whose speeds the ties keep at zero
+    Flags at_rest;        // of these and of those that are redundant, all but the ends of gaps that are open
+    Flags twist_rests;    // gears whose twist has no rate
+    bool light_shafts{};  // whether inertias of shafts that hang together differ much
     std::vector<Driver<Row>> drivers;
     std::vector<LockedTorque<Row>> locked;  // in the order in which they are held: from the load to the motors
     // The only driver, if it is one input, and which way this has to go on.
@@ -198,7 +202,7 @@ struct Regime {
     bool solvable = true;  // false: the reactions have no unique solution (jamming)
     bool in_data = true;   // false: a loss map is used outside its data
 
-    // Keeps but its memory.
+    // Keeps its memory, and what the modes determine.
     void clear() {
         for (auto* rows : {&rate, &motor_torque, &output_torque, &input_torque, &gear_hysteresis, &contact_torque,
                            &drive_torque, &motion, &loss})
@@ -207,7 +211,6 @@ struct Regime {
         massless.clear();
         drivers.clear();
         locked.clear();
-        at_rest = {};
         driving_input = -1;
         driving_way = 0.0;
         solvable = in_data = true;

@@ -13,8 +13,10 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <memory>
 #include <optional>
 #include <type_traits>
 #include <variant>
@@ -65,26 +67,40 @@ struct ResponseOf {
     }
 };
 
-// The steps of all levels and their responses. What an earlier use has left there is written over.
+// The steps of all levels, each with its responses, in one block. What an earlier use has left there is written over.
 inline constexpr std::size_t usual_levels = 12;
 template <class D>
 class LevelsOf {
  public:
     void reach(std::size_t levels, const CountsOf<D>&, int pairs) {
-        pairs_ = pairs;
-        const auto all = levels * static_cast<std::size_t>(pairs);
-        if (steps_.empty()) steps_.reserve(usual_levels);
-        if (steps_.size() < levels) steps_.resize(levels);
-        if (responses_.empty()) responses_.reserve(usual_levels * static_cast<std::size_t>(pairs));
-        if (responses_.size() < all) responses_.resize(all);
+        const std::size_t stride = (sizeof(StepOf<D>) + static_cast<std::size_t>(pairs) * sizeof(ResponseOf<D>)) / unit;
+        if (stride != stride_) made_ = 0;
+        stride_ = stride;
+        if (levels <= made_) return;
+        if (levels * stride > room_) {
+            room_ = std::max(2 * made_, usual_levels) * stride;
+            std::unique_ptr<Unit[]> grown = std::make_unique_for_overwrite<Unit[]>(room_);
+            std::copy_n(block_.get(), made_ * stride, grown.get());
+            block_ = std::move(grown);
+        }
+        std::fill(block_.get() + made_ * stride, block_.get() + levels * stride, Unit{});
+        made_ = levels;
     }
-    StepOf<D>& step(int k, double) { return steps_[static_cast<std::size_t>(k)]; }
-    ResponseOf<D>* responses(int k) { return responses_.data() + k * pairs_; }
+    StepOf<D>& step(int k, double) { return *reinterpret_cast<StepOf<D>*>(level(k)); }
+    ResponseOf<D>* responses(int k) { return reinterpret_cast<ResponseOf<D>*>(level(k) + sizeof(StepOf<D>) / unit); }
 
  private:
-    int pairs_ = 0;
-    std::vector<StepOf<D>> steps_;          // one a level
-    std::vector<ResponseOf<D>> responses_;  // levels x pairs
+    static constexpr std::size_t unit = alignof(StepOf<D>);
+    static_assert(sizeof(ResponseOf<D>) % unit == 0 && unit % alignof(ResponseOf<D>) == 0);
+    static_assert(std::is_trivially_copyable_v<StepOf<D>> && std::is_trivially_copyable_v<ResponseOf<D>>);
+    struct alignas(unit) Unit {
+        std::byte bytes[unit];
+    };
+
+    Unit* level(int k) { return block_.get() + static_cast<std::size_t>(k) * stride_; }
+
+    std::size_t stride_ = 0, made_ = 0, room_ = 0;  // units of a level, levels, units
+    std::unique_ptr<Unit[]> block_;
 };
 // The same of a train of any size: level by level in one block.
 template <>

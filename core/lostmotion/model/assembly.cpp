@@ -4,18 +4,12 @@ namespace lostmotion::model {
 
 void Assembly::build(const Key& key, Regime& r) const {
     r.clear();
-    r.key = key;
-    r.ties = places().ties(key.modes);
-    for (int c = 0; c < layout().contacts; ++c)
-        r.at_rest[c] = (!places().contacts[c].gap.present() || key.modes[c] == 0) &&
-                       (r.ties.redundant[c] || kept_at_rest(places().contacts[c], r.ties));
-
+    equations_.set_key(key, r);
     equations_.compose(key, r);
     for (const int s : places().driven) r.drive_torque.push_back(equations_.drive_torque(s, r.motion[s]));
-    Statics statics(places(), key, r.ties, r.motion);
-    r.solvable = statics.solve(
-        {r.motor_torque, r.output_torque, r.input_torque, r.gear_hysteresis, r.contact_torque, r.drive_torque});
-    r.massless = statics.massless();
+    r.solvable = Statics(places(), equations_.inertias(), r)
+                     .solve({r.motor_torque, r.output_torque, r.input_torque, r.gear_hysteresis, r.contact_torque,
+                             r.drive_torque});
     equations_.set_rates(key, r);
     equations_.add_coupled_inertias(r);
     RegimeGuards(equations_, *this, r).add_all();

@@ -122,11 +122,11 @@ auto ElementForms::coupling_torque(const CouplingElement& c, const Regime& r) co
     return c.contact == nowhere ? torque : r.contact_torque[c.contact] + torque;
 }
 
-bool ElementForms::twist_rests(int gear, const Regime& r) const {
+bool ElementForms::twist_rests(int gear, const Ties& ties) const {
     const Gear& g = train_.gears[gear];
     if (g.rigid()) return true;
-    if (r.ties.at_rest[g.input] && r.ties.at_rest[g.output] && g.housing == nowhere) return true;
-    return !g.transmission_error.present() && kept_at_rest(twist_place(g, gear), r.ties);
+    if (ties.at_rest[g.input] && ties.at_rest[g.output] && g.housing == nowhere) return true;
+    return !g.transmission_error.present() && kept_at_rest(twist_place(g, gear), ties);
 }
 
 auto ElementForms::controller_signal(int k, const LinearController::Signal& signal) const -> Row {

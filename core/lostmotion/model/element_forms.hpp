@@ -85,7 +85,7 @@ class ElementForms {
         return -e.torque(site(e.shaft), key);
     }
     // Is the rate of the twist kept at zero?
-    bool twist_rests(int gear, const Regime& r) const;
+    bool twist_rests(int gear, const Ties& ties) const;
 
     // Of a stepper, the electrical angle of its field before its rotor: n (phi* - phi).
     Row field_lead(int motor) const;

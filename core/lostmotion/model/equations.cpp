@@ -2,6 +2,21 @@
 
 namespace lostmotion::model {
 
+void Equations::set_key(const Key& key, Regime& r) const {
+    const bool same_modes = !r.ties.of.empty() && r.key.modes == key.modes;
+    r.key = key;
+    if (same_modes) return;
+    r.ties = places_.ties(key.modes);
+    for (int c = 0; c < layout_.contacts; ++c) {
+        r.kept_at_rest[c] = kept_at_rest(places_.contacts[c], r.ties);
+        r.at_rest[c] =
+            (!places_.contacts[c].gap.present() || key.modes[c] == 0) && (r.ties.redundant[c] || r.kept_at_rest[c]);
+    }
+    for (std::size_t g = 0; g < train_.gears.size(); ++g)
+        r.twist_rests[g] = forms_.twist_rests(static_cast<int>(g), r.ties);
+    r.light_shafts = Statics(places_, inertias_, r).has_light_shafts();
+}
+
 void Equations::compose(const Key& key, Regime& r) const {
     const std::size_t gears = train_.gears.size();
     r.output_torque.resize(gears);
@@ -84,7 +99,8 @@ void Equations::compose_gear(int gear, const Key& key, Regime& r) const {
         T_2 = Row{};
     else if (flanks == Gear::limited)
         T_2 = 2.0 * P;
-    else if (g.mesh_damping > 0.0 && !(g.has_backlash() && key.branch[p.piece] == 0) && !forms_.twist_rests(gear, r))
+    else if (g.mesh_damping > 0.0 && !(g.has_backlash() && key.branch[p.piece] == 0) &&
+             !std::as_const(r.twist_rests)[gear])
         T_2 += g.mesh_damping * forms_.twist_rate(gear, key);
 
     Row& T_1 = r.input_torque[gear];
@@ -106,8 +122,7 @@ void Equations::compose_coupling(const CouplingElement& c, const Key& key, Regim
     if (slip == 0)
         torque = held(c.contact, r);
     else if (!c.is_one_way())
-        torque = static_cast<double>(slip) *
-                 forms_.coupling_capacity(c, r, kept_at_rest(places_.contacts[c.contact], r.ties));
+        torque = static_cast<double>(slip) * forms_.coupling_capacity(c, r, std::as_const(r.kept_at_rest)[c.contact]);
 }
 
 // What the dry contact of a shaft takes. One that "slips" while others keep it at rest gives all that it holds.
@@ -243,7 +258,7 @@ void Equations::set_rates(const Key& key, Regime& r) const {
     }
     for (std::size_t g = 0; g < train_.gears.size(); ++g) {
         const GearPlace& p = places_.gears[g];
-        if (p.twist != nowhere && !forms_.twist_rests(static_cast<int>(g), r))
+        if (p.twist != nowhere && !std::as_const(r.twist_rests)[g])
             r.rate[p.twist] = forms_.twist_rate(static_cast<int>(g), key);
     }
     for (const auto& c : places_.couplings)

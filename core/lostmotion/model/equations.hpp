@@ -21,8 +21,12 @@ class Equations {
           train_(forms.train()),
           places_(forms.places()),
           layout_(forms.layout()),
-          terms_(forms.terms()) {}
+          terms_(forms.terms()),
+          inertias_(forms.places()) {}
 
+    const Inertias& inertias() const { return inertias_; }
+    // Sets the key of a regime, and what its modes determine; that stays where the key before has the same modes.
+    void set_key(const Key& key, Regime& r) const;
     // Torques, and the net torque of each shaft, in terms of the reactions of the stuck contacts as well.
     void compose(const Key& key, Regime& r) const;
     // What the given motion of a shaft turns it with, beside all that else acts on it: J w' less that.
@@ -60,6 +64,7 @@ class Equations {
     const Places& places_;
     const Layout& layout_;
     const Terms& terms_;
+    const Inertias inertias_;
 };
 
 }  // namespace lostmotion::model

@@ -3,13 +3,7 @@
 namespace lostmotion::model {
 
 auto RegimeGuards::add(const Row& form, Guard::Kind kind, int contact, int branch, int neighbour) -> Guard& {
-    Guard& guard = regime_.guards.emplace_back();
-    guard.form = form;
-    guard.kind = kind;
-    guard.contact = contact;
-    guard.branch = branch;
-    guard.neighbour = neighbour;
-    return guard;
+    return regime_.guards.emplace_back(form, kind, contact, branch, neighbour);
 }
 
 void RegimeGuards::add_all() {
@@ -48,7 +42,7 @@ void RegimeGuards::add_speed_guards() {
 
 // A contact whose speed is given, at rest while that is zero.
 void RegimeGuards::add_given_speed(int contact) {
-    if (kept_at_rest(places_.contacts[contact], regime_.ties)) return;
+    if (regime_.kept_at_rest[contact]) return;
     for (const int s : {+1, -1})
         add(-static_cast<double>(s) * forms_.contact_speed(contact), Guard::set_off, contact, nowhere, s);
 }
@@ -70,7 +64,7 @@ void RegimeGuards::add_gaps() {
         const Gap& gap = c.gap;
         const int side = regime_.key.branch[gap.side];
         if (regime_.key.modes[contact] != 0) {
-            if (kept_at_rest(c, regime_.ties)) return;
+            if (regime_.kept_at_rest[contact]) return;
             const Row at = gap.turn == nowhere ? terms_.state(gap.at) : terms_.state(gap.at) - terms_.memory(gap.turn);
             add(terms_.one(gap.high) - at, Guard::impact, contact, nowhere, 0);
             Guard& low = add(terms_.one(-gap.low) + at, gap.passes ? Guard::edge : Guard::impact, contact, nowhere, 0);
@@ -179,12 +173,12 @@ void RegimeGuards::add_turning() {
 
 void RegimeGuards::add_driver(int contact) {
     Regime stuck;
-    stuck.key = regime_.key;
-    stuck.key.modes[contact] = 0;
-    stuck.ties = places_.ties(stuck.key.modes);
-    equations_.compose(stuck.key, stuck);
+    Key key = regime_.key;
+    key.modes[contact] = 0;
+    equations_.set_key(key, stuck);
+    equations_.compose(key, stuck);
     Row& overcome = stuck.contact_torque[contact];
-    if (!Statics(places_, stuck.key, stuck.ties, stuck.motion).solve({{&overcome, 1}})) return;
+    if (!Statics(places_, equations_.inertias(), stuck).solve({{&overcome, 1}})) return;
     // The torque that its rest leaves open in addition.
     int open = 0;
     while (open < layout_.contacts && (!stuck.ties.redundant[open] || regime_.ties.redundant[open])) ++open;
@@ -236,7 +230,7 @@ bool RegimeGuards::moves(int state) const {
 void RegimeGuards::add_twist_pieces(int gear) {
     const Gear& g = train_.gears[gear];
     const GearPlace& p = places_.gears[gear];
-    if (p.piece == nowhere || forms_.twist_rests(gear, regime_)) return;
+    if (p.piece == nowhere || regime_.twist_rests[gear]) return;
     const TorsionCurve& curve = g.law.curve;
     const int piece = regime_.key.branch[p.piece];
     const int slip = p.contact == nowhere ? 0 : regime_.key.modes[p.contact];

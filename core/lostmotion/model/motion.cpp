@@ -26,35 +26,49 @@ double magnitude(const Layout& n, const Row& f, const Instant& now) {
     return sum;
 }
 
-std::size_t terms_of(const Row& f) {
-    return static_cast<std::size_t>(std::count_if(f.c.begin(), f.c.end(), [](double c) { return c != 0.0; }));
+void FormMaker::begin(const Layout& n, std::size_t rows) {
+    layout_ = &n;
+    const std::size_t most = rows * static_cast<std::size_t>(n.terms) + 1;  // one is written beyond the last
+    if (room_.size() < most) room_.resize(most);
+    end_ = room_.data();
 }
 
-LinearForm linear_form(const Row& f, const Layout& n, std::vector<LinearForm::Term>& block) {
-    LinearForm out;
-    out.begin = block.data() + block.size();
+LinearForm FormMaker::operator()(const Row& f) {
+    const Layout& n = *layout_;
     const double* c = f.c.begin();
     const int known = static_cast<int>(f.c.size());
-    int count = 0;
+    LinearForm out;
+    out.begin = end_;
+    LinearForm::Term* at = end_;
+    // Every term is written, and that which is zero written over: which ones are cannot be foreseen.
     const auto add = [&](int first, int end) {
-        for (int k = first; k < std::min(end, known); ++k)
-            if (c[k] != 0.0) {
-                block.push_back({k - first, c[k]});
-                ++count;
-            }
-        return count;
+        for (int k = first; k < std::min(end, known); ++k) {
+            *at = {k - first, c[k]};
+            at += c[k] != 0.0;
+        }
+        return static_cast<int>(at - out.begin);
     };
     out.coupled = add(0, n.coupled);
     out.states = add(n.coupled, n.states);
     out.one = f.c[n.one];
     out.memory = add(n.first_memory, n.first_memory + n.memory);
     out.inputs = add(n.first_input, n.first_input + n.inputs);
+    end_ = at;
+    return out;
+}
+
+FormMaker::Terms FormMaker::block() const {
+    Terms out = std::make_unique_for_overwrite<LinearForm::Term[]>(terms());
+    std::copy_n(room_.data(), terms(), out.get());
     return out;
 }
 
 OwnForm::OwnForm(const Row& f, const Layout& n) {
-    terms_.reserve(terms_of(f));
-    static_cast<LinearForm&>(*this) = linear_form(f, n, terms_);
+    FormMaker maker;
+    maker.begin(n, 1);
+    static_cast<LinearForm&>(*this) = maker(f);
+    terms_ = maker.block();
+    maker.move(*this, terms_);
 }
 
 double evaluate(const LinearForm& f, const Instant& now) {

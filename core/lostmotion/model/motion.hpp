@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <memory>
 #include <span>
 #include <vector>
 
@@ -43,9 +44,24 @@ double evaluate(const Layout& n, const Row& f, const Instant& now);
 // Sum of the magnitudes of the terms, with those of the inputs' parts.
 double magnitude(const Layout& n, const Row& f, const Instant& now);
 
-// How many terms of a row are not zero, and the form of these, which go to a block that has room for them.
-std::size_t terms_of(const Row& f);
-LinearForm linear_form(const Row& f, const Layout& n, std::vector<LinearForm::Term>& block);
+// Makes forms of the terms of rows that are not zero, one after the other in memory that is used again.
+class FormMaker {
+ public:
+    // rows: how many it is to make, at most.
+    void begin(const Layout& n, std::size_t rows);
+    LinearForm operator()(const Row& f);
+
+    // The terms of all forms since the beginning, in a block of their own, to which `move` brings each of these forms.
+    using Terms = std::unique_ptr<LinearForm::Term[]>;
+    Terms block() const;
+    void move(LinearForm& f, const Terms& to) const { f.begin = to.get() + (f.begin - room_.data()); }
+    std::size_t terms() const { return static_cast<std::size_t>(end_ - room_.data()); }
+
+ private:
+    const Layout* layout_ = nullptr;
+    std::vector<LinearForm::Term> room_;
+    LinearForm::Term* end_ = nullptr;
+};
 
 // A form with terms of its own.
 struct OwnForm : LinearForm {
@@ -53,7 +69,7 @@ struct OwnForm : LinearForm {
     OwnForm(OwnForm&&) = default;
 
  private:
-    std::vector<Term> terms_;
+    FormMaker::Terms terms_;
 };
 
 double evaluate(const LinearForm& f, const Instant& now);

@@ -74,7 +74,7 @@ void each_flow(const Assembly& a, Use&& use) {
             use(PowerFlow::loss, gear.name, "impacts", [](const Regime&) -> Flow { return {}; });
         if ((gear.rigid() || gear.strikes()) && !has_alias(train, gear.name + ": hysteresis and damping")) continue;
         use(PowerFlow::loss, gear.name, "hysteresis and damping", [&](const Regime& r) -> Flow {
-            if (a.twist_rests(g, r)) return {};
+            if (r.twist_rests[g]) return {};
             // All of the output torque that is not the spring's.
             return {{gear.mesh_damping > 0.0 ? r.output_torque[k] - a.spring_torque(g, r.key) : r.gear_hysteresis[k],
                      a.twist_rate(g, r.key)}};

@@ -34,7 +34,7 @@ std::vector<GivenState> given_states(const Regime& r, const Places& places) {
 }  // namespace
 
 SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const double> near_state,
-                           std::span<const double> near_input)
+                           std::span<const double> near_input, FormMaker& sparse)
     : key(r.key),
       given(given_states(r, a.places())),
       at_rest(r.at_rest),
@@ -50,28 +50,14 @@ SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const d
         const Gear& gear = a.train().gears[g];
         lost.push_back(gear.sense() * (gear.law.ratio * r.input_torque[g] - r.output_torque[g]));
     }
-    // The forms refer to the block, which must not grow.
-    std::size_t terms = 0, forms = 0;
-    const auto count = [&](const Row& f) { terms += terms_of(f); };
-    const auto each_list = [&](auto&& use) {
-        for (const auto* rows : {&r.output_torque, &r.input_torque, &r.contact_torque, &r.motor_torque, &r.drive_torque,
-                                 &std::as_const(lost)})
-            use(*rows);
-    };
-    for (const Row& f : r.rate) count(f);
-    each_list([&](const std::vector<Row>& rows) {
-        for (const Row& f : rows) count(f);
-        forms += rows.size();
-    });
-    for (const MasslessSpeed& m : r.massless) count(m.form);
-    for (const model::Guard& g : r.guards) count(g.form);
-    for (const Driver<Row>& d : r.drivers) count(d.torque), count(d.rate);
-    for (const LockedTorque<Row>& l : r.locked) count(l.low), count(l.high), count(l.needs), count(l.friction);
-    block_.reserve(terms);
-    const std::size_t coupled = (static_cast<std::size_t>(n.coupled) + 3) / 4 * 4;
-    forms_.reserve(coupled + static_cast<std::size_t>(n.angles) + forms + r.massless.size() + 1);
+    std::size_t torques = lost.size();
+    for (const auto* rows : {&r.output_torque, &r.input_torque, &r.contact_torque, &r.motor_torque, &r.drive_torque})
+        torques += rows->size();
+    const auto coupled = static_cast<std::size_t>((n.coupled + 3) / 4 * 4);
+    const std::size_t forms = coupled + static_cast<std::size_t>(n.angles) + torques + r.massless.size() + 1;
+    forms_.reserve(forms);
+    sparse.begin(n, forms + r.guards.size() + 2 * r.drivers.size() + 4 * r.locked.size());
 
-    const auto sparse = [&](const Row& f) { return linear_form(f, n, block_); };
     const auto all = [&](const auto& rows, auto&& row) {
         const LinearForm* first = forms_.data() + forms_.size();
         for (const auto& f : rows) forms_.push_back(sparse(row(f)));
@@ -94,23 +80,37 @@ SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const d
     guards.reserve(r.guards.size());
     near_event.reserve(r.guards.size());
     for (const model::Guard& g : r.guards) {
-        Row f = g.form;
-        const auto each_variable = [&](auto&& use) {
-            for (int k = 0; k < n.coupled; ++k) use(f.c[k], near_state[static_cast<std::size_t>(k)]);
-            for (int i = 0; i < n.inputs; ++i) use(f.c[n.first_input + i], near_input[static_cast<std::size_t>(i)]);
+        const auto each_variable = [&](auto&& coefficients, auto&& use) {
+            for (int k = 0; k < n.coupled; ++k) use(coefficients[k], near_state[static_cast<std::size_t>(k)]);
+            for (int i = 0; i < n.inputs; ++i)
+                use(coefficients[n.first_input + i], near_input[static_cast<std::size_t>(i)]);
         };
         double near = 0.0;
-        each_variable([&](double factor, double size) { near += std::fabs(factor) * size; });
+        each_variable(g.form.c, [&](double factor, double size) { near += std::fabs(factor) * size; });
+        near_event.push_back(near);
+        if (r.drivers.empty()) {
+            guards.push_back(g.with(sparse(g.form)));
+            continue;
+        }
         // Contacts at their limits leave all torques at rest to one elimination. What it has left of a term that is
         // none must not decide where all other terms are zero.
-        each_variable([&](double& factor, double size) {
-            if (!r.drivers.empty() && std::fabs(factor) * size <= left_by_elimination * near) factor = 0.0;
+        Row f = g.form;
+        each_variable(f.c, [&](double& factor, double size) {
+            if (std::fabs(factor) * size <= left_by_elimination * near) factor = 0.0;
         });
         guards.push_back(g.with(sparse(f)));
-        near_event.push_back(near);
     }
     for (const Driver<Row>& d : r.drivers) drivers.push_back({d.contact, sparse(d.torque), sparse(d.rate)});
     for (const LockedTorque<Row>& l : r.locked) locked.push_back(l.with(sparse));
+    terms_ = sparse.terms();
+    block_ = sparse.block();
+    const auto move = [&](LinearForm& f) {
+        if (f.begin != nullptr) sparse.move(f, block_);
+    };
+    for (LinearForm& f : forms_) move(f);
+    for (Guard& g : guards) move(g.form);
+    for (Driver<LinearForm>& d : drivers) move(d.torque), move(d.rate);
+    for (LockedTorque<LinearForm>& l : locked) move(l.low), move(l.high), move(l.needs), move(l.friction);
     const auto& shafts = a.places().shafts;
     for (std::size_t s = 0; s < shafts.size(); ++s) {
         if (r.ties.at_rest[s]) resting[shafts[s].speed] = true;
@@ -131,11 +131,12 @@ SparseRegimes::SparseRegimes(const Assembly& assembly) : assembly_(assembly) {
                 far_from_event * rated_torque(assembly.train(), static_cast<int>(s));
 }
 
-const SparseRegime& SparseRegimes::operator[](const Key& key) {
-    if (const SparseRegime* known = table_[key]) return *known;
-    const SparseRegime& made = *known_.emplace_back(make(key));
+const std::shared_ptr<const SparseRegime>& SparseRegimes::share(const Key& key) {
+    if (const Shared* known = table_[key]) return *known;
+    const Shared& made = known_.emplace_back(
+        std::make_shared<const SparseRegime>(composed(key), assembly_, near_state_, near_input_, form_));
     table_.add(made);
-    bytes_ += made.bytes();
+    bytes_ += made->bytes();
     return made;
 }
 
@@ -146,20 +147,16 @@ void SparseRegimes::make_room() {
     bytes_ = 0;
 }
 
-std::unique_ptr<const SparseRegime> SparseRegimes::make(const Key& key) {
-    return std::make_unique<const SparseRegime>(composed(key), assembly_, near_state_, near_input_);
-}
-
 const std::vector<SparseRegime::Flow>& SparseRegimes::flows(const SparseRegime& r) {
     if (r.flows == nullptr) {
         auto flows = std::make_unique<SparseRegime::Flows>();
         const std::vector<NumberedPower> powers = power_flows(assembly_, composed(r.key));
-        std::size_t terms = 0;
-        for (const NumberedPower& f : powers) terms += terms_of(f.power.torque) + terms_of(f.power.speed);
-        flows->block.reserve(terms);
-        const auto sparse = [&](const Row& f) { return linear_form(f, assembly_.layout(), flows->block); };
+        form_.begin(assembly_.layout(), 2 * powers.size());
         for (const NumberedPower& f : powers)
-            flows->all.push_back({f.flow, sparse(f.power.torque), sparse(f.power.speed)});
+            flows->all.push_back({f.flow, form_(f.power.torque), form_(f.power.speed)});
+        flows->block = form_.block();
+        for (SparseRegime::Flow& f : flows->all)
+            for (LinearForm* form : {&f.torque, &f.speed}) form_.move(*form, flows->block);
         r.flows = std::move(flows);
     }
     return r.flows->all;

@@ -1,6 +1,7 @@
 // Regimes with their forms as the terms that are not zero: what the search of modes and the kernels go by.
 #pragma once
 
+#include <deque>
 #include <memory>
 #include <span>
 #include <vector>
@@ -39,37 +40,38 @@ struct SparseRegime {
     };
     struct Flows {
         std::vector<Flow> all;
-        std::vector<LinearForm::Term> block;
+        FormMaker::Terms block;
     };
     mutable std::unique_ptr<const Flows> flows;
 
     // near_state, near_input: what states and inputs have near an event, by the layout.
     SparseRegime(const Regime& r, const Assembly& a, std::span<const double> near_state,
-                 std::span<const double> near_input);
+                 std::span<const double> near_input, FormMaker& form);
     SparseRegime(const SparseRegime&) = delete;
     SparseRegime& operator=(const SparseRegime&) = delete;
 
     // About what it takes.
     std::size_t bytes() const {
         return sizeof *this + sizeof(Guard) * guards.size() + sizeof(forms_[0]) * forms_.size() +
-               sizeof(block_[0]) * block_.size();
+               sizeof(LinearForm::Term) * terms_;
     }
 
  private:
     std::vector<LinearForm> forms_;
-    std::vector<LinearForm::Term> block_;  // of all forms
+    std::size_t terms_;
+    FormMaker::Terms block_;  // of all forms
 };
 
 class SparseRegimes {
  public:
     explicit SparseRegimes(const Assembly& assembly);
 
+    // One that stays where it is while somebody has it.
+    const std::shared_ptr<const SparseRegime>& share(const Key& key);
     // It stays where it is until the next call of `make_room`.
-    const SparseRegime& operator[](const Key& key);
+    const SparseRegime& operator[](const Key& key) { return *share(key); }
     // Forgets all regimes if they take more memory than is to be kept.
     void make_room();
-    // One that is the caller's.
-    std::unique_ptr<const SparseRegime> make(const Key& key);
     // The flows of power of a regime.
     const std::vector<SparseRegime::Flow>& flows(const SparseRegime& r);
 
@@ -81,13 +83,15 @@ class SparseRegimes {
 
     const Assembly& assembly_;
     std::vector<double> near_state_, near_input_;
+    using Shared = std::shared_ptr<const SparseRegime>;
     struct KeyOf {
-        const Key& operator()(const SparseRegime& r) const { return r.key; }
+        const Key& operator()(const Shared& r) const { return r->key; }
     };
-    std::vector<std::unique_ptr<const SparseRegime>> known_;
-    KeyTable<const SparseRegime, KeyOf> table_;
+    std::deque<Shared> known_;
+    KeyTable<const Shared, KeyOf> table_;
     std::size_t bytes_ = 0;
-    Regime composed_;  // its memory is used again
+    Regime composed_;  // its memory is used again, as that of the next
+    FormMaker form_;
 };
 
 }  // namespace lostmotion::model

@@ -73,26 +73,23 @@ int given_behind(const Places& places, const Train& train, std::size_t gear) {
     return nowhere;
 }
 
-Statics::Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion)
-    : places_(places), contacts_(places.contacts), layout_(places.layout), key_(key), ties_(ties), motion_(motion) {
-    for (const ShaftPlace& s : places.shafts) inertia_.push_back(s.inertia);
-    pivot_ = inertia_;
-    if (!places.coupled_inertias.empty()) factorise();
-}
-
-void Statics::factorise() {
-    const std::size_t n = shafts();
-    factor_.assign(n, std::vector<double>(n));
+Inertias::Inertias(const Places& places) {
+    for (const ShaftPlace& s : places.shafts) of.push_back(s.inertia);
+    pivot = of;
+    if (places.coupled_inertias.empty()) return;
+    const std::size_t n = of.size();
+    const auto is_given = [&](int s) { return places.shafts[s].given_acceleration != nowhere; };
+    factor.assign(n, std::vector<double>(n));
     Matrix left(n, std::vector<double>(n));  // of J, its lower triangle
-    for (const CoupledInertia& c : places_.coupled_inertias)
-        if (!is_given(static_cast<std::size_t>(c.a)) && !is_given(static_cast<std::size_t>(c.b)))
+    for (const CoupledInertia& c : places.coupled_inertias)
+        if (!is_given(c.a) && !is_given(c.b))
             left[static_cast<std::size_t>(std::max(c.a, c.b))][static_cast<std::size_t>(std::min(c.a, c.b))] = c.value;
     for (std::size_t k = 0; k < n; ++k)
         for (std::size_t s = k + 1; s < n; ++s) {
             if (left[s][k] == 0.0) continue;
-            factor_[s][k] = left[s][k] / pivot_[k];
-            for (std::size_t t = k + 1; t < s; ++t) left[s][t] -= factor_[s][k] * left[t][k];
-            pivot_[s] -= factor_[s][k] * left[s][k];
+            factor[s][k] = left[s][k] / pivot[k];
+            for (std::size_t t = k + 1; t < s; ++t) left[s][t] -= factor[s][k] * left[t][k];
+            pivot[s] -= factor[s][k] * left[s][k];
         }
 }
 
@@ -108,12 +105,12 @@ void Statics::divide_by_inertias() {
     const auto subtract_row = [&](std::size_t to, double factor, std::size_t from) {
         if (factor != 0.0) motion_[to] -= factor * motion_[from];
     };
-    for (std::size_t k = 0; k < n && !factor_.empty(); ++k)
-        for (std::size_t s = k + 1; s < n; ++s) subtract_row(s, factor_[s][k], k);
+    for (std::size_t k = 0; k < n && !inertias_.factor.empty(); ++k)
+        for (std::size_t s = k + 1; s < n; ++s) subtract_row(s, inertias_.factor[s][k], k);
     for (std::size_t s = 0; s < n; ++s)
-        if (!is_given(s)) motion_[s] = motion_[s] / pivot_[s];
-    for (std::size_t k = n; k-- > 0 && !factor_.empty();)
-        for (std::size_t s = k + 1; s < n; ++s) subtract_row(k, factor_[s][k], s);
+        if (!is_given(s)) motion_[s] = motion_[s] / inertias_.pivot[s];
+    for (std::size_t k = n; k-- > 0 && !inertias_.factor.empty();)
+        for (std::size_t s = k + 1; s < n; ++s) subtract_row(k, inertias_.factor[s][k], s);
 }
 
 // Contacts at rest that raise the rank.
@@ -124,7 +121,6 @@ std::vector<int> Statics::stuck() const {
     return of;
 }
 
-// Do the inertias of shafts that hang together, as one of them feels them, differ that much?
 bool Statics::has_light_shafts() const {
     std::vector<double> speed(shafts());  // of each shaft, while the first shaft of its part turns at 1: magnitudes
     for (std::size_t first = 0; first < shafts(); ++first) {
@@ -133,8 +129,8 @@ bool Statics::has_light_shafts() const {
         double least = std::numeric_limits<double>::infinity(), most = 0.0;
         const auto count = [&](std::size_t s) {
             if (is_given(s)) return;
-            least = std::fmin(least, pivot_[s] * speed[s] * speed[s]);
-            most = std::fmax(most, inertia_[s] * speed[s] * speed[s]);
+            least = std::fmin(least, inertias_.pivot[s] * speed[s] * speed[s]);
+            most = std::fmax(most, inertias_.of[s] * speed[s] * speed[s]);
         };
         count(first);
         for (bool more = true; more;) {
@@ -158,7 +154,7 @@ bool Statics::has_light_shafts() const {
 
 bool Statics::solve(Forms forms) {
     const std::vector<int> of = stuck();
-    if (has_light_shafts()) return solve_balances(of, forms);
+    if (regime_.light_shafts) return solve_balances(of, forms);
     divide_by_inertias();
     return solve_reactions(of, forms);
 }
@@ -206,7 +202,7 @@ void Statics::follow(Row& f, const Ties& heavy) const {
 
 bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     const int all = static_cast<int>(shafts());
-    const Ties heavy = places_.ties(key_.modes, inertia_.data());
+    const Ties heavy = places_.ties(key_.modes, inertias_.of.data());
     const int columns = layout_.terms + layout_.contacts;  // accelerations come behind them
     // Accelerations first, each from the balance of a heavy shaft: what reactions are then is the share of the light
     // shafts, and no difference of two torques on the heavy one.
@@ -245,8 +241,8 @@ bool Statics::solve_balances(const std::vector<int>& of, Forms forms) {
     for (const std::span<Row> some : forms)
         for (Row& f : some) put(f);
     for (const int s : places_.massless) {
-        massless_.push_back({places_.shafts[s].speed, Row::unit(places_.shafts[s].speed)});
-        put(massless_.back().form);
+        regime_.massless.push_back({places_.shafts[s].speed, Row::unit(places_.shafts[s].speed)});
+        put(regime_.massless.back().form);
     }
     for (int s = 0; s < all; ++s) {
         motion_[s] = Row{};

@@ -16,7 +16,15 @@ std::vector<int> parts(const Places& places, const Key& key);
 // A shaft of given motion that rigid gears tie to the output of a rigid gear, without that gear itself; or nowhere.
 int given_behind(const Places& places, const Train& train, std::size_t gear);
 
-// What the reactions of stuck contacts are solved from, J being the mass matrix, most often diagonal. Where the shafts
+// The mass matrix J of the shafts, most often diagonal, and J = L D L^T of those whose motion is not given.
+struct Inertias {
+    explicit Inertias(const Places& places);
+
+    std::vector<double> of, pivot;            // of each shaft: the diagonals of J and of D
+    std::vector<std::vector<double>> factor;  // L, where J is not diagonal
+};
+
+// What the reactions of stuck contacts are solved from, J being the mass matrix. Where the shafts
 // of each rigidly tied part have inertias of like size, reactions come first: C J^-1 (F + B lambda) = 0, C being the
 // speeds of the contacts by those of the shafts. A light shaft makes terms 1/J of that which cancel. Then all is solved
 // at once, without a division by an inertia: the balances J S a = F + B lambda of all shafts, S being their speeds by
@@ -24,29 +32,35 @@ int given_behind(const Places& places, const Train& train, std::size_t gear);
 // depends on by dampers.
 class Statics {
  public:
-    // motion: of each shaft, the net torque; it becomes the acceleration. That of a shaft whose motion is given is an
-    // input: J is infinite there.
-    Statics(const Places& places, const Key& key, const Ties& ties, std::vector<Row>& motion);
+    // The motion of the regime is, for each shaft, the net torque; it becomes the acceleration. That of a shaft whose
+    // motion is given is an input: J is infinite there.
+    Statics(const Places& places, const Inertias& inertias, Regime& regime)
+        : places_(places),
+          contacts_(places.contacts),
+          layout_(places.layout),
+          inertias_(inertias),
+          regime_(regime),
+          key_(regime.key),
+          ties_(regime.ties),
+          motion_(regime.motion) {}
 
     // Some lists of forms.
     using Forms = std::initializer_list<std::span<Row>>;
-    // Eliminates the reactions from the motion and the forms. False if they have no unique solution.
+    // Eliminates the reactions from the motion and the forms, and finds the speeds of shafts without inertia. False if
+    // they have no unique solution.
     bool solve(Forms forms);
-    // Speeds of shafts without inertia, once it is solved.
-    const std::vector<MasslessSpeed>& massless() const { return massless_; }
+    // Do the inertias of shafts that hang together, as one of them feels them, differ that much?
+    bool has_light_shafts() const;
 
  private:
     std::vector<int> stuck() const;
-    bool has_light_shafts() const;
-    // J = L D L^T, of the shafts whose motion is not given.
-    void factorise();
     // motion = J^-1 motion.
     void divide_by_inertias();
     // Calls use(shaft, inertia) for each entry of a row of J; that of a shaft whose motion is given is 1 w' = w'_given.
     template <class Use>
     void each_inertia(std::size_t shaft, Use&& use) const {
         const int s = static_cast<int>(shaft);
-        use(s, is_given(shaft) ? 1.0 : inertia_[shaft]);
+        use(s, is_given(shaft) ? 1.0 : inertias_.of[shaft]);
         if (!is_given(shaft)) places_.each_coupled_inertia(s, use);
     }
     bool solve_reactions(const std::vector<int>& of, Forms forms);
@@ -69,12 +83,11 @@ class Statics {
     const Places& places_;
     const std::vector<ContactPlace>& contacts_;
     const Layout& layout_;
+    const Inertias& inertias_;
+    Regime& regime_;
     const Key& key_;
     const Ties& ties_;
     std::vector<Row>& motion_;
-    std::vector<double> inertia_, pivot_;      // of each shaft: the diagonals of J and of D
-    std::vector<std::vector<double>> factor_;  // L, where J is not diagonal
-    std::vector<MasslessSpeed> massless_;
 };
 
 }  // namespace lostmotion::model

@@ -31,7 +31,7 @@ class RegimeCache {
         Entry(const Entry&) = delete;
         Entry& operator=(const Entry&) = delete;
 
-        std::unique_ptr<const Regime> regime;
+        std::shared_ptr<const Regime> regime;
         LinearRatesOf<D> rates;
         GuardTable guards;
         int n_guards;                        // as many as there is room for
