@@ -51,14 +51,14 @@ def rig(
     Prints the comparison with its data sheet; with -o, writes rig.html (one page) and the measurements as CSV. A screw is measured at a tenth of its dynamic capacity.
     """
     from ..data_sheets.linear_sheets import ScrewSheet
-    from ..data_sheets.records import find_one_of
+    from ..data_sheets.records import find
 
     pictures = pictures_of(figures, output)
     if ripple is not None and logs is None:
         raise InputError("--ripple: is for the logs of a campaign; give --logs DIR, too")
     if logs is not None:
         try_directory(logs)
-    sheet = find_one_of(name, ("gearbox", "screw"))
+    sheet = find(name, "gearbox", "screw")
     if isinstance(sheet, ScrewSheet) and logs is not None:
         raise InputError(f"--logs: {sheet.name} is a screw, and logs are written of gearboxes; leave --logs out")
     if logs is not None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from functools import cache, lru_cache
 from importlib.resources import files
 from pathlib import Path
@@ -176,41 +176,25 @@ def _in_file(reference: str, table: str) -> Sheet:
     return own[0]
 
 
-def find(reference: str, table: str) -> Sheet:
-    """The record of a name, or one of that kind in a file: the only one (``sheets.toml``), or the record of a name (``sheets.toml#name``).
+def find(reference: str, *tables: str) -> Sheet:
+    """Find the record of a name, or a record in a file: the only one (``sheets.toml``), or that of a name (``sheets.toml#name``).
 
-    table: a key of `KINDS`, such as ``"gearbox"``.
+    tables: kinds that are possible, keys of `KINDS` such as ``"gearbox"``.
+
+    Raises InputError: there is none.
     """
-    kind = KINDS[table]
+    wanted = " or ".join(table.replace("_", " ") for table in tables)
     if not isinstance(reference, str):
-        raise InputError(f"{table}: {shown(reference)} must be the name of a record, or of a file with one")
-    if is_in_file(reference):
-        return _in_file(reference, table)
-    record = _named(reference)
-    if isinstance(record, kind):
-        return record
-    same = [r.name for r in catalogue() if isinstance(r, kind)]
-    hint = names_like(reference, same, "`lostmotion catalogue` lists them")
-    if record is not None:
-        raise InputError(
-            f"{reference} is {called(table_of(record))}; {called(table)} is wanted here; `lostmotion catalogue` lists them"
-        )
-    raise InputError(f"{table.replace('_', ' ')} {shown(reference)} is not in the catalogue; {hint}")
-
-
-def find_one_of(reference: str, tables: Sequence[str]) -> Sheet:
-    """Find a record of one of several kinds, as `find` does. Raises InputError: there is none."""
+        raise InputError(f"{wanted}: {shown(reference)} must be the name of a record, or of a file with one")
     if is_in_file(reference):
         of_file = {table_of(record) for record in read_again(Path(reference.partition("#")[0]))}
-        return find(reference, next((table for table in tables if table in of_file), tables[0]))
-    wanted = " or ".join(table.replace("_", " ") for table in tables)
+        return _in_file(reference, next((table for table in tables if table in of_file), tables[0]))
     record = _named(reference)
     if record is None:
         same = [r.name for r in catalogue() if table_of(r) in tables]
         hint = names_like(reference, same, "`lostmotion catalogue` lists them")
         raise InputError(f"{wanted} {shown(reference)} is not in the catalogue; {hint}")
     if table_of(record) not in tables:
-        raise InputError(
-            f"{reference} is {called(table_of(record))}; a {wanted} is wanted here; `lostmotion catalogue` lists them"
-        )
+        other = f"{reference} is {called(table_of(record))}; {called(wanted)} is wanted here"
+        raise InputError(f"{other}; `lostmotion catalogue` lists them")
     return record
