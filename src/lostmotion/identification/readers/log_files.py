@@ -10,11 +10,14 @@ from ...errors import InputError, prefixed
 from ...inputs.arguments import checked
 from ...inputs.limits import check_memory
 from .log import Log
-from .measurement_files import read_hdf5_log, read_mat_log, read_mdf_log, read_parquet_log, read_tdms_log
+from .matlab_and_hdf5_logs import read_hdf5_log, read_mat_log
+from .mdf_logs import read_mdf_log
 from .numpy_logs import read_numpy_log
+from .parquet_logs import read_parquet_log
 from .robot_logs import read_mcap_log, read_ros_bag
 from .servo_json_logs import read_servo_json
 from .spreadsheet_logs import read_xlsx_log
+from .tdms_logs import read_tdms_log
 from .text_logs import read_text_log
 
 READERS: dict[str, Callable[..., Log]] = {

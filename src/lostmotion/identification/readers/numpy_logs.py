@@ -11,7 +11,7 @@ from ...errors import InputError
 from ...inputs.limits import check_memory
 from ...inputs.zip_files import members
 from .log import Log, as_refusal
-from .measurement_files import log_of_variables
+from .named_arrays import log_of_variables
 
 HEADER = 64_000  # [bytes] of a description of an array
 

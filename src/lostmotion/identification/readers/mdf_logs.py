@@ -1,16 +1,20 @@
-"""The links between blocks of an MDF 4 file, checked before a library follows them.
+"""Logs in MDF 4 files, read by asammdf. Before that library follows the links between their blocks, the links are checked.
 
 Layout: ASAM MDF 4.2, block header of 24 bytes (id, length, number of links), links of 8 bytes, then data.
 """
 
 import struct
 import zlib
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path
-from typing import BinaryIO
+from typing import Any, BinaryIO
 
-from ...errors import InputError
+import numpy as np
+
+from ...errors import InputError, need
 from ...inputs.limits import check_memory
+from .channel_conversions import conversion_of
+from .log import Channel, Log, quiet_ends, reason, warnings_of
 
 FIRST = 64  # address of the header block
 MAX_DEPTH = 20  # lists inside of lists
@@ -18,6 +22,104 @@ LINKS = 1_000_000  # of one block
 EXPANSION = 1032  # bytes that deflate makes of one, at most
 DATA = (b"##DT", b"##SD", b"##RD", b"##DV", b"##DI")
 DEFLATE = (0, 1)  # plain and transposed
+ALGEBRAIC = 3  # type of a conversion of MDF 4
+MDF_NUMBERS = range(6)  # data types of MDF 4: integers and floating-point numbers of both byte orders
+
+
+def read_mdf_log(path: Path, time: str) -> Log:
+    """Read an MDF 4 file by asammdf: all channels at the instants of the channel `time`, or of the first.
+
+    Algebraic conversions are read by `conversion_of`. Databases of buses that a file attaches are not read.
+    """
+    need("asammdf", "Reading MDF files", "identify")
+    check_mdf_blocks(path)
+    problem = ""
+    with warnings_of("asammdf") as said, quiet_ends():
+        try:
+            signals = _mdf_signals(path)
+        except InputError:
+            raise
+        except Exception as error:  # the library raises what its parts raise
+            problem = reason(error)
+    if problem:
+        raise InputError(f"is not an MDF file that asammdf reads ({problem})")
+    numbers = [signal for signal in signals if signal.samples.dtype.kind in "biuf" and signal.samples.ndim == 1]
+    if not numbers:
+        raise InputError("has no channel of numbers")
+    first = next((signal for signal in numbers if signal.name == time), numbers[0])
+    clock = np.asarray(first.timestamps, dtype=float)
+    channels = {
+        s.name: Channel(np.interp(clock, s.timestamps, s.samples.astype(float)), str(s.unit or "")) for s in numbers
+    }
+    log = Log("", clock - clock[0], channels)
+    return log.noted(f"asammdf reports: {said[0]}") if said else log
+
+
+def _mdf_signals(path: Path) -> list[Any]:
+    import asammdf
+
+    with asammdf.MDF(path, process_bus_logging=False) as file:  # type: ignore[call-arg]
+        formulas = _formulas(file)
+        _check_mdf_memory(file)
+        masters = {(k, m) for k, m in file.masters_db.items()}
+        places = {name: at for name, at in file.channels_db.items() if not masters.intersection(at)}
+        return [_signal(file, name, at, formulas) for name, at in places.items() if _is_plain(file, at[0])]
+
+
+Formulas = dict[tuple[int, int], Callable[[np.ndarray], np.ndarray]]
+
+
+def _formulas(file: Any) -> Formulas:
+    """Algebraic conversions by group and channel; they are taken out of the file, so that its library evaluates none."""
+    found: Formulas = {}
+    for k, group in enumerate(file.groups):
+        for n, channel in enumerate(group.channels):
+            rule = channel.conversion
+            if rule is None:
+                continue
+            try:
+                if rule.conversion_type == ALGEBRAIC:
+                    found[k, n] = conversion_of(rule.formula)
+                    channel.unit = channel.unit or rule.unit
+                    channel.conversion = None
+                elif _has_formula(rule):
+                    raise ValueError("is a table with a formula in it, which is not supported")
+            except ValueError as error:
+                raise InputError(f"channel {channel.name}: its conversion {error}") from None
+    return found
+
+
+def _has_formula(rule: Any) -> bool:
+    inner = [one for one in (rule.referenced_blocks or {}).values() if hasattr(one, "conversion_type")]
+    return any(one.conversion_type == ALGEBRAIC or _has_formula(one) for one in inner)
+
+
+def _check_mdf_memory(file: Any) -> None:
+    """Refuse channels that need more memory than the limit: raw values, physical ones, and instants of each."""
+    needed = 0.0
+    for group in file.groups:
+        about = group.channel_group
+        record = about.samples_byte_nr + about.invalidation_bytes_nr
+        needed += float(about.cycles_nr) * (record + 24.0 * len(group.channels))
+    check_memory(needed)
+
+
+def _is_plain(file: Any, at: tuple[int, int]) -> bool:
+    """Whether a channel holds one number for each instant, by what its block says."""
+    channel = file.groups[at[0]].channels[at[1]]
+    return channel.data_type in MDF_NUMBERS and not file.groups[at[0]].channel_dependencies[at[1]]
+
+
+def _signal(file: Any, name: str, at: Sequence[tuple[int, int]], formulas: Formulas) -> Any:
+    """Physical values of a channel at their instants."""
+    signal = file.get(name)  # refuses a name that several groups have
+    group, place = at[0]
+    if (group, place) in formulas:
+        signal.samples = formulas[group, place](signal.samples)
+    master = (group, file.masters_db.get(group))
+    if master in formulas:
+        signal.timestamps = formulas[master](signal.timestamps)
+    return signal
 
 
 def check_mdf_blocks(path: Path) -> None:
