@@ -14,7 +14,7 @@ from report import Report
 
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
-from lostmotion.portable.descriptions import kernel_of
+from lostmotion.portable.scenario_as_numbers import kernel_of
 
 ROOT = Path(__file__).parent.parent
 CHROMIUM = Path("/usr/bin/chromium")

@@ -223,20 +223,20 @@ SLOW = {
     "test_identification_campaign.py": "a gearbox found from the logs of its own virtual rig",
     "test_identification_cycloidal.py": "measured logs with published values",
     "test_identification_residuals.py": "fits that end in a wrong minimum must be reported",
-    "test_joint_rest.py": "break-away times against a linear programme",
+    "test_break_away_of_rigid_groups.py": "break-away times against a linear programme",
     "test_packaging.py": "processes without each optional library",
     "test_paper.py": "the whole reproduction of the paper",
     "test_select.py": "pairs of motor and gearbox simulated over whole cycles",
     "test_pages.py": "every page that is made is parsed",
     "test_pointing.py": "tracking errors of whole passes",
-    "test_portable.py": "every scenario in WebAssembly, bit for bit",
+    "test_webassembly.py": "every scenario in WebAssembly, bit for bit",
     "test_response.py": "Jacobians of periodic motions against differences of runs",
     "test_servo.py": "margins and tuning against time responses of the exact loop",
     "test_settling.py": "random axes whose settling is decided by long runs",
     "test_slurm.py": "workers as processes, by the scripts of SLURM jobs",
     "test_study.py": "interrupted and distributed studies with real processes",
     "test_study_train.py": "the same for trains",
-    "test_verdicts.py": "random axes whose verdicts are decided by long runs",
+    "test_hunting_decision.py": "random axes whose verdicts are decided by long runs",
 }
 
 

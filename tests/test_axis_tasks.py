@@ -9,7 +9,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.duty import ArmGravity, Duty, Payload, Process, Supply
-from lostmotion.model.linear import RatedScrew
+from lostmotion.model.screw import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing.axis_rules import derated, emergency_stop, gearbox_life, holding_brake, output_bearing, with_safety
 from lostmotion.sizing.catalogue_formulas import derating

@@ -13,7 +13,7 @@ import pytest
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.portable.derivation import Derivation, derivation_of
-from lostmotion.portable.descriptions import numbers_of
+from lostmotion.portable.scenario_as_numbers import numbers_of
 from lostmotion.reproducible import arctan, cbrt, cos, sin
 from refusals import refused
 from test_c_interface import INPUTS, INTERRUPTED, INVALID, OK, STATES, VARIABLES, Signal, doubles, library  # noqa: F401

@@ -14,7 +14,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, ROOT, jamming
-from lostmotion.portable import fmu as exporting
+from lostmotion.portable import fmu_export as exporting
 from refusals import refused
 
 fmpy: Any = pytest.importorskip("fmpy", reason="FMPy is missing: .venv/bin/pip install --group portable")

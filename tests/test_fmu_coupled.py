@@ -11,7 +11,7 @@ import pytest
 from scipy.integrate import solve_ivp
 
 import lostmotion as lm
-import pendulum as joint
+import pendulum_fmu as joint
 import speed_controller as law
 
 NANOSECOND = 1e-9

@@ -20,7 +20,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.portable import fmu as exporting
+from lostmotion.portable import fmu_export as exporting
 from lostmotion.portable.dependencies import dependencies_of
 from lostmotion.simulation.forms.key_aliases import DRIVE
 

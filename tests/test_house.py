@@ -36,7 +36,7 @@ PACKAGE = ROOT / "src" / "lostmotion"
 LAYERS = [
     {"errors", "namespace", "verdict", "version", "_instruction_set"},
     {"_core", "atomic_writer"},
-    {"recorded_numbers", "worker_threads"},
+    {"recorded_numbers", "interruptible_threads"},
     {"reproducible"},
     {"units"},
     {"inputs"},
@@ -70,7 +70,7 @@ INNER = {
         {"verdicts"},
         {"candidate_models"},
         {"left_out_conditions", "result_as_scenario", "virtual_logs", "monitor"},
-        {"result", "campaign"},
+        {"result", "virtual_campaign"},
         {"identify", "experiment_design"},
     ],
     "servo": [

@@ -7,7 +7,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli.entry import app
-from lostmotion.identification.campaign import OFF, experiments, parameters, rig_scenario
+from lostmotion.identification.virtual_campaign import OFF, experiments, parameters, rig_scenario
 from lostmotion.simulation.scenario.scenario_files import gearbox_from_record
 from refusals import refused
 

@@ -16,7 +16,7 @@ from lostmotion.cli import app
 from lostmotion.errors import InputError
 from lostmotion.live_page.description import describe
 from lostmotion.portable.derivation import derivation_of
-from lostmotion.portable.descriptions import numbers_of
+from lostmotion.portable.scenario_as_numbers import numbers_of
 from lostmotion.simulation.forms.dotted_keys import set_values
 from refusals import refused
 

@@ -7,7 +7,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.model.duty import Duty, Supply
-from lostmotion.model.linear import RatedScrew
+from lostmotion.model.screw import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing import catalogue_formulas
 from lostmotion.sizing.axis_rules import screw_rules

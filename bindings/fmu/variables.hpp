@@ -1,4 +1,4 @@
-// The variables that an FMU declares, by their value references. src/lostmotion/portable/fmu_model.py has the same.
+// The variables that an FMU declares, by their value references. src/lostmotion/portable/fmu_variables.py has the same.
 #pragma once
 
 #include <algorithm>

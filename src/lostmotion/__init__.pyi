@@ -43,9 +43,9 @@ from .model.slide import Slide as Slide
 from .model.springs import Spring as Spring
 from .model.train import DriveTrain as DriveTrain
 from .pointing.budget import pointing_budget as pointing_budget
-from .portable.fmu import export_fmu as export_fmu
+from .portable.fmu_export import export_fmu as export_fmu
 from .response.harmonic import frequency_response as frequency_response
-from .response.linear import linearize as linearize
+from .response.linearisation import linearize as linearize
 from .response.shooting import periodic_motion as periodic_motion
 from .response.spectrum import spectrum as spectrum
 from .servo.commission import commission as commission

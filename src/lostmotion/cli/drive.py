@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from .arguments import Overrides, SourceArgument, again, load_scenario, option
-from .targets import try_page
+from .output_files import try_page
 from .terminal import about, conclude, simulating
 
 

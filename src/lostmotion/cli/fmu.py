@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from .arguments import Overrides, SourceArgument, flag, load_scenario, option
-from .targets import try_file
+from .output_files import try_file
 from .terminal import about, busy
 
 SYSTEMS = {"linux": "Linux", "windows": "Windows", "darwin": "macOS"}
@@ -40,7 +40,7 @@ def fmu(
     Inputs are commands, load torques and references of continuous controllers. Each follows its signal in the scenario until the importer sets it. Outputs are the result variables; parameters have the keys of the scenario file.
     """
     from ..errors import InputError
-    from ..portable.fmu import export_fmu
+    from ..portable.fmu_export import export_fmu
 
     if output.suffix != ".fmu":
         raise InputError(f"{output}: must end in .fmu")
@@ -68,7 +68,7 @@ def _platforms(path: Path) -> str:
     """The line that says where an FMU runs."""
     from zipfile import ZipFile
 
-    from ..portable.fmu import PLATFORMS
+    from ..portable.fmu_export import PLATFORMS
 
     builds = {place: build for each in PLATFORMS.values() for build, (place, _) in each.items()}
     with ZipFile(path) as file:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 import typer
 
 from .arguments import FiguresOption, argument, flag, option
-from .targets import pictures_of, writing
+from .output_files import pictures_of, writing
 from .terminal import busy, fail
 
 if TYPE_CHECKING:

@@ -3,7 +3,7 @@
 from pathlib import Path
 
 from .arguments import Overrides, SourceArgument, again, flag, load_scenario, option
-from .targets import try_file
+from .output_files import try_file
 from .terminal import about, busy
 
 

@@ -5,7 +5,7 @@ from pathlib import Path
 import typer
 
 from .arguments import FiguresOption, ReportOption, argument
-from .targets import pictures_of, writing
+from .output_files import pictures_of, writing
 from .terminal import busy
 
 

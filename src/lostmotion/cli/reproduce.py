@@ -1,7 +1,7 @@
 """`lostmotion reproduce`."""
 
 from .arguments import FiguresOption, ReportOption
-from .targets import pictures_of, writing
+from .output_files import pictures_of, writing
 from .terminal import progress
 
 

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import FiguresOption, Overrides, ReportOption, SourceArgument, again, load_scenario, number, option
-from .targets import pictures_of, writing
+from .output_files import pictures_of, writing
 from .terminal import about, announce_response, busy, progress
 
 if TYPE_CHECKING:

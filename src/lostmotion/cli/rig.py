@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..errors import InputError
 from .arguments import FiguresOption, ReportOption, argument, complete_on_rig, option
-from .targets import pictures_of, try_directory, writing
+from .output_files import pictures_of, try_directory, writing
 from .terminal import busy, progress
 
 if TYPE_CHECKING:
@@ -108,7 +108,7 @@ def _measured(name: str, sheet: Record, overrides: Sequence[str]) -> tuple[RigRe
 
 
 def _write_logs(name: str, sheet: Record, overrides: Sequence[str], directory: Path, ripple: str | None) -> None:
-    from ..identification.campaign import write_campaign
+    from ..identification.virtual_campaign import write_campaign
     from ..simulation.scenario.scenario_files import gearbox_from_record
 
     part, _ = gearbox_from_record(name, overrides)

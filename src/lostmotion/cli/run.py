@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from .arguments import Overrides, SourceArgument, again, flag, load_scenario, number, option, print_timed_moves
-from .targets import try_file, try_page
+from .output_files import try_file, try_page
 from .terminal import about, busy, conclude, simulating
 
 if TYPE_CHECKING:

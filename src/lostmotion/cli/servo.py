@@ -20,7 +20,7 @@ from .arguments import (
     print_bare,
     print_timed_moves,
 )
-from .targets import try_directory, try_file, writing
+from .output_files import try_directory, try_file, writing
 from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:

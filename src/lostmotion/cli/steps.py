@@ -5,8 +5,8 @@ from pathlib import Path
 from ..errors import InputError
 from .arguments import Overrides, SourceArgument, again, load_scenario, option
 from .grids import parse_grid
+from .output_files import try_file
 from .run import PICTURES
-from .targets import try_file
 from .terminal import about, busy
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from .arguments import FiguresOption, argument, count, flag, option
-from .targets import pictures_of, try_directory, writing
+from .output_files import pictures_of, try_directory, writing
 from .terminal import busy, conclude, fail, progress
 from .workers import workers
 

@@ -18,7 +18,7 @@ from .arguments import (
     option,
     print_bare,
 )
-from .targets import pictures_of, writing
+from .output_files import pictures_of, writing
 from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:

@@ -32,9 +32,9 @@ from ..recorded_numbers import real
 from ..reproducible import cbrt, cos, cubic_spline, sin, sqrt
 from ..units.practical import printed
 from .cam_laws import peaks, timed
+from .pointing_targets import Circle, FlyBy, Star, Track, Weave
 from .profiles import Segment, segments
 from .satellites import Satellite
-from .targets import Circle, FlyBy, Star, Track, Weave
 
 S = TypeVar("S")  # the rate of a value, with its unit
 A = TypeVar("A")  # its second derivative

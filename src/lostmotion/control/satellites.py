@@ -12,7 +12,7 @@ from ..errors import need
 from ..inputs.part import rule
 from ..inputs.quantities import Angle, Length, Limit, Time
 from ..reproducible import cos, sin
-from .targets import ORDER, Jet, TargetPath
+from .pointing_targets import ORDER, Jet, TargetPath
 
 # The earth, WGS 84.
 EQUATOR, FLATTENING = 6378137.0, 1.0 / 298.257223563

@@ -85,7 +85,7 @@ def _at_preload(record: ScrewSheet, preload: Any, values: Mapping[str, Any], whe
     If no drag is printed, it is computed for two halves of the nut that the preload presses against each other. One
     half drives while the other is driven back: (1/eta - eta_b) F p/(2 pi).
     """
-    from ..model.linear import RatedScrew
+    from ..model.screw import RatedScrew
 
     with inside(where):
         force = ScrewConditions(nut_preload=preload).nut_preload

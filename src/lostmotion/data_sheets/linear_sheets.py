@@ -21,9 +21,9 @@ from ..inputs.quantities import (
     Voltage,
     Whole,
 )
-from ..model.linear import RatedScrew
 from ..model.linear_motor import LinearMotorData
 from ..model.rack_and_belt import RatedBelt, RatedRack
+from ..model.screw import RatedScrew
 from .sheet import Record
 
 Alternatives = tuple[tuple[tuple[str, ...], ...], ...]

@@ -1,4 +1,3 @@
-from .campaign import write_campaign as write_campaign
 from .candidate_models import RungResult as RungResult
 from .experiment_design import Candidate as Candidate
 from .experiment_design import design_experiment as design_experiment
@@ -19,3 +18,4 @@ from .task.identification_file import load_identification as load_identification
 from .verdicts.identifiability import Undetermined as Undetermined
 from .verdicts.shared_faults import KindError as KindError
 from .verdicts.shared_faults import SharedFault as SharedFault
+from .virtual_campaign import write_campaign as write_campaign

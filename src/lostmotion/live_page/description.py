@@ -9,7 +9,7 @@ import numpy as np
 from ..control.command import FieldAngle
 from ..model.signals import Signal
 from ..model.torsion import TorsionCurve
-from ..portable.descriptions import described
+from ..portable.scenario_as_numbers import described
 from ..simulation.scenario.requirements import need_free_motion
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.units_of_keys import limit_in, unit_for

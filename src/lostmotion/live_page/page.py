@@ -9,7 +9,7 @@ from pathlib import Path
 from ..atomic_writer import write_bytes
 from ..errors import InputError
 from ..portable.checkout import made_here
-from ..portable.descriptions import kernel_of
+from ..portable.scenario_as_numbers import kernel_of
 from ..simulation.scenario.scenario import Scenario
 from .description import describe
 

@@ -8,12 +8,6 @@ from .couplings import TorqueLimiter as TorqueLimiter
 from .end_stops import EndStops as EndStops
 from .end_stops import ShaftEndStops as ShaftEndStops
 from .gearbox import GearboxLimits as GearboxLimits
-from .linear import PitchCurve as PitchCurve
-from .linear import PitchHarmonic as PitchHarmonic
-from .linear import RatedScrew as RatedScrew
-from .linear import Screw as Screw
-from .linear import ScrewData as ScrewData
-from .linear import StiffnessCurve as StiffnessCurve
 from .linear_motor import LinearMotor as LinearMotor
 from .losses import ConstantEfficiency as ConstantEfficiency
 from .losses import LossMap as LossMap
@@ -24,6 +18,12 @@ from .mesh_stiffness import MeshStiffness as MeshStiffness
 from .motor import MotorLimits as MotorLimits
 from .rack_and_belt import Belt as Belt
 from .rack_and_belt import Rack as Rack
+from .screw import PitchCurve as PitchCurve
+from .screw import PitchHarmonic as PitchHarmonic
+from .screw import RatedScrew as RatedScrew
+from .screw import Screw as Screw
+from .screw import ScrewData as ScrewData
+from .screw import StiffnessCurve as StiffnessCurve
 from .shaft import DragCurve as DragCurve
 from .shaft import EddyCurrentDrag as EddyCurrentDrag
 from .shaft import FrictionCurve as FrictionCurve

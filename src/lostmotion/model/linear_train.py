@@ -10,10 +10,10 @@ from ..inputs.named_elements import Elements, Named, nothing
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..recorded_numbers import may_differ
 from .gear import Gear
-from .linear import LinearDrive, Screw
 from .linear_motor import LinearMotor
 from .motor import ShaftMotor
 from .rack_and_belt import Belt, Rack
+from .screw import LinearDrive, Screw
 from .shaft import FrictionCurve, Shaft
 from .train import TrainElements
 

@@ -9,7 +9,7 @@ from pydantic import Field, model_validator
 from ..inputs.part import rule
 from ..inputs.quantities import Angle, Force, Length, Limit, Positive, Whole
 from ..reproducible import cos
-from .linear import LinearDrive, Placed, one_way
+from .screw import LinearDrive, Placed, one_way
 
 
 class RackData(LinearDrive):

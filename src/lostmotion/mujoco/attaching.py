@@ -23,7 +23,7 @@ from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.shipped_scenarios import shipped_scenarios
 from ..simulation.stepping.robot_joints import output_of
 from .driven_robot import MAX_SUBSTEPS, Actuated
-from .joints import acts, compiled, joint_id
+from .joints_by_name import acts, compiled, joint_id
 from .mjcf import JointActuator
 from .overlaps import clear, without_weight
 

@@ -13,7 +13,7 @@ from ..errors import InputError
 from ..inputs.refusal_messages import did_you_mean, listed, shown
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import JointDrive, JointTrains, joint_drive
-from .joints import acts, is_slide, joint_id, mass_matrix
+from .joints_by_name import acts, is_slide, joint_id, mass_matrix
 from .mjcf import JointActuator
 
 if TYPE_CHECKING:

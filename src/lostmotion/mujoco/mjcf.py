@@ -25,7 +25,7 @@ from ..model.torsion import LinearStiffness, Rigid
 from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import Driven
-from .joints import acts, actuator_name, actuators_of, compiled, is_slide, joint_id
+from .joints_by_name import acts, actuator_name, actuators_of, compiled, is_slide, joint_id
 
 if TYPE_CHECKING:
     import mujoco

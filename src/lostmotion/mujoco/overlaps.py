@@ -12,7 +12,7 @@ from ..model.angle_torques import PeriodicTorque
 from ..model.shaft_ratio import turns
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.stepping.robot_joints import output_of
-from .joints import actuator_name, actuators_of, joint_id
+from .joints_by_name import actuator_name, actuators_of, joint_id
 
 if TYPE_CHECKING:
     import mujoco

@@ -14,7 +14,7 @@ from ..errors import InputError, need
 from ..inputs.arguments import checked
 from ..portable.checkout import made_here
 from ..portable.derivation import Derivation
-from ..portable.descriptions import written
+from ..portable.scenario_as_numbers import written
 from ..simulation.forms.train_tables import TrainInitial
 from ..simulation.stepping.robot_joints import joint_drive, output_of
 from ..simulation.stepping.solver_access import solver_train

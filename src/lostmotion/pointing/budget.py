@@ -15,6 +15,7 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import argument
 from ..inputs.refusal_messages import did_you_mean, shown
+from ..interruptible_threads import thread_pool
 from ..model.shaft_ratio import turns
 from ..response.spectrum import Spectrum, spectrum
 from ..simulation.runs.lost_steps import LostSteps, found_in
@@ -24,7 +25,6 @@ from ..simulation.runs.run import run
 from ..simulation.runs.sample_means import weights
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.variables_of_trains import angle_of_run
-from ..worker_threads import thread_pool
 from .causes import CAUSES, VARIANTS, present, without
 from .robustness import ROBUSTNESS, SPEEDS
 

@@ -1,1 +1,1 @@
-from .descriptions import description as description
+from .scenario_as_numbers import description as description

@@ -7,7 +7,7 @@ from xml.etree import ElementTree as ET
 import numpy as np
 
 from ..errors import InputError
-from .fmu_model import document
+from .fmu_variables import document
 
 SOURCES = ("solving.cpp", "model.cpp", "fmi.cpp", "resources.cpp")  # the files to compile
 _LANGUAGE = "C++20"

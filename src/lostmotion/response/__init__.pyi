@@ -1,7 +1,7 @@
 from .crossovers import bandwidth as bandwidth
 from .crossovers import characteristics as characteristics
 from .harmonic import to_control as to_control
-from .linear import LinearModel as LinearModel
+from .linearisation import LinearModel as LinearModel
 from .rigid import RigidConstants as RigidConstants
 from .rigid import rigid_constants as rigid_constants
 from .shooting import periodic_motions as periodic_motions

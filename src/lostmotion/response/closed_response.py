@@ -9,10 +9,10 @@ import numpy as np
 
 from .. import _core
 from ..control.custom_controller import Law
+from ..interruptible_threads import thread_pool
 from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.variables_of_trains import signals_of
-from ..worker_threads import thread_pool
 from .closed_loop import AxisSignal, ClosedLoop, Motion, Search, mean_of
 from .plant import Plant
 from .windows import Window, fitting

@@ -17,7 +17,7 @@ from ..inputs.quantities import Count, Number, Torque, arguments
 from ..model.drive import Drive
 from ..simulation.scenario.scenario import Scenario
 from .closed_response import respond_closed, windows_for
-from .linear import python_control
+from .linearisation import python_control
 from .plant import Plant, known_output, plant_or_loop
 from .shooting import MAX_PERIODS, SAMPLES_PER_PERIOD, floquet_multipliers, is_stable, reason_of, respond
 from .windows import SAMPLES

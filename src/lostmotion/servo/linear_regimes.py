@@ -18,7 +18,7 @@ from ..model.gear import Gear
 from ..model.shaft_ratio import tied, turns
 from ..model.signals import ForceSignal, TorqueSignal, core_signal
 from ..model.torsion import Elastic, Rigid
-from ..response.linear import LinearModel, train_model
+from ..response.linearisation import LinearModel, train_model
 from ..simulation.forms.train_tables import TrainInitial
 from ..simulation.scenario.requirements import need_free_motion
 from ..simulation.scenario.scenario import Scenario

@@ -15,7 +15,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError
-from ..response.linear import LinearModel
+from ..response.linearisation import LinearModel
 from .linear_regimes import Axis, Regime
 
 INPUTS = ("reference", "rate", "acceleration", "measured")

@@ -26,7 +26,7 @@ from ..control.loops import FieldOriented
 from ..errors import InputError
 from ..model.synchronous_motor import PhaseValues
 from ..model.train import DriveTrain
-from ..response.linear import LinearModel
+from ..response.linearisation import LinearModel
 
 POINTS, WEIGHTS = (0.5 * (x + s) for x, s in zip(np.polynomial.legendre.leggauss(12), (1.0, 0.0), strict=True))
 """weights of Gauss's formula over a tick, as shares of the tick"""

@@ -11,9 +11,9 @@ import numpy as np
 
 from ..model.duty import HoldingBrake
 from ..model.gearbox import Gearbox
-from ..model.linear import RatedScrew
 from ..model.motor import Motor
 from ..model.rack_and_belt import RatedBelt, RatedRack
+from ..model.screw import RatedScrew
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
 from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, tooth_shares, widths, working_tension
 from .catalogue_formulas import belt_force, buckling_force, compression_force, critical_speed, dn_speed, tooth_forces

@@ -6,7 +6,7 @@ They know nothing of tasks and records; `axis_rules` compares what they give wit
 import math
 from collections.abc import Sequence
 
-from ..model.linear import ELASTIC_MODULUS, STEEL
+from ..model.screw import ELASTIC_MODULUS, STEEL
 
 BUCKLING: dict[str, float] = {
     "fixed-free": 0.25,

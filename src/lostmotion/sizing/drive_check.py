@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from ..inputs.arguments import checked
-from ..model.linear import RatedScrew
 from ..model.losses import LossMap
+from ..model.screw import RatedScrew
 from ..model.shaft_ratio import turns
 from ..simulation.runs.results import RunArrays
 from ..simulation.runs.run import run

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.linear import RatedScrew
+from ..model.screw import RatedScrew
 from .duty_cycle import integral
 from .required_motion import InputDemand, RequiredMotion
 

@@ -12,9 +12,9 @@ from ..data_sheets.linear_components import linear_table
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.gears_in_series import in_series
-from ..model.linear import LinearDrive, RatedScrew
 from ..model.losses import ConstantEfficiency, LossMap, efficiency_map
 from ..model.rack_and_belt import RatedBelt, RatedRack
+from ..model.screw import LinearDrive, RatedScrew
 from ..model.torsion import Hysteresis, Rigid
 from .required_motion import RequiredMotion
 

@@ -11,7 +11,7 @@ import numpy as np
 from ..data_sheets.linear_sheets import ScrewSheet
 from ..inputs.arguments import checked
 from ..inputs.quantities import Force
-from ..model.linear import ScrewData
+from ..model.screw import ScrewData
 from ..units.practical import RPM
 from .comparison import Comparison
 from .screw_rig import RATED, ScrewRig

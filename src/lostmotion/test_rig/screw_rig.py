@@ -10,8 +10,8 @@ from ..errors import InputError
 from ..inputs.arguments import checked
 from ..inputs.quantities import Force, Speed
 from ..model.drive import Drive
-from ..model.linear import ScrewData
 from ..model.load import Load
+from ..model.screw import ScrewData
 from ..model.torsion import Rigid
 from ..simulation.forms.drive_tables import Initial
 from ..simulation.runs.run import run

@@ -14,11 +14,11 @@ from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.quantities import Count
 from ...inputs.refusal_messages import shown
+from ...interruptible_threads import thread_pool
 from ...response.plant import known_output, plant_of
 from ...response.shooting import floquet_multipliers, is_stable, motion_of
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.units_of_keys import unit_for
-from ...worker_threads import thread_pool
 from ..linear_regimes import axis_of
 from .hunting_decision import Verdict
 from .limit_cycle_causes import PART, at_rest, without, without_backlash, without_friction

@@ -12,8 +12,8 @@ from typing import Any
 from ...inputs.part import Part
 from ...model.couplings import Commanded
 from ...model.gear import Gear
-from ...model.linear import LinearDrive
 from ...model.linear_train import LinearElements
+from ...model.screw import LinearDrive
 from ...model.torsion import TorsionCurve
 from ...response.closed_loop import slowest
 from ...simulation.scenario.scenario import Scenario

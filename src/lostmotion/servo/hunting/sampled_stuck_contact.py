@@ -19,7 +19,7 @@ from ... import _core
 from ...control.controller import Controller
 from ...control.loops import FirstOrderCurrent, IdealCurrent
 from ...model.shaft_ratio import turns
-from ...response.linear import LinearModel
+from ...response.linearisation import LinearModel
 from ...simulation.forms.train_tables import TrainInitial
 from ..linear_regimes import Axis
 from .hunting_decision import FOREVER

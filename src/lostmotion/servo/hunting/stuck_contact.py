@@ -20,7 +20,7 @@ from ... import _core
 from ...errors import InputError
 from ...model.shaft_ratio import turns
 from ...model.torsion import Rigid
-from ...response.linear import LinearModel
+from ...response.linearisation import LinearModel
 from ...simulation.forms.train_tables import TrainInitial
 from ...simulation.scenario.scenario import Scenario
 from ..linear_regimes import case_at, model_at

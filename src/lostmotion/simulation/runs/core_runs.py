@@ -5,7 +5,7 @@ from typing import Any
 from ... import _core
 from ...control.axis import BoundController
 from ...inputs.cached_values import kept
-from ...worker_threads import thread_pool
+from ...interruptible_threads import thread_pool
 from ..scenario.scenario import Scenario
 from .separate_trains import SIDE_BY_SIDE, control_of_part, joined_results, parts_of
 

@@ -14,9 +14,9 @@ from ...errors import InputError
 from ...inputs.arguments import checked
 from ...inputs.limits import check_free
 from ...inputs.quantities import Number
+from ...interruptible_threads import thread_pool
 from ...model.drive import Drive
 from ...model.signals import TorqueSignal
-from ...worker_threads import thread_pool
 from ..forms.drive_tables import Initial
 from ..forms.train_tables import TrainInitial
 from ..scenario.field_oriented_motors import ATTRIBUTE as ERROR_BOUND

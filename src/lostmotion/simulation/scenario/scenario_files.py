@@ -17,8 +17,8 @@ from ...inputs.schema import follow, unit_in_schema
 from ...inputs.toml_files import RESULTS, no_such_file, read_toml
 from ...inputs.toml_text import toml_text, without_empty
 from ...model.gearbox import Gearbox
-from ...model.linear import RatedScrew, ScrewData
 from ...model.notes import Noted, Notes
+from ...model.screw import RatedScrew, ScrewData
 from ..forms.axis_form import file_schema
 from ..forms.dotted_keys import parse_override, set_values
 from ..forms.key_aliases import in_file

@@ -11,10 +11,11 @@ import numpy as np
 
 from ...data_sheets.linear_sheets import LinearMotorSheet
 from ...errors import InputError, Problem
+from ...interruptible_threads import thread_pool
 from ...model.gearbox import Gearbox
 from ...model.gears_in_series import DIRECT
-from ...model.linear import RatedScrew
 from ...model.motor import Motor
+from ...model.screw import RatedScrew
 from ...servo.linear_regimes import axis_of
 from ...servo.margins import unstable_pole
 from ...simulation.forms.key_aliases import MOTOR
@@ -52,7 +53,6 @@ from ...sizing.required_motion import (
 from ...sizing.stages import Stage, at_input, together
 from ...sizing.stepper_check import speed_of_stepper, stepper_rules
 from ...sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
-from ...worker_threads import thread_pool
 from ..study.drive_check_columns import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE, columns_of
 from ..study.drive_check_columns import TASK_COLUMNS as CHECKS
 from ..study.study_definition import Study

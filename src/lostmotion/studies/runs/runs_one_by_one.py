@@ -4,10 +4,10 @@ import json
 
 import numpy as np
 
+from ...interruptible_threads import thread_pool
 from ...simulation.runs.pointing_error import pointing_errors
 from ...simulation.runs.run import run
 from ...simulation.scenario.field_oriented_motors import bound_values
-from ...worker_threads import thread_pool
 from ..study.drive_check_columns import COLUMNS, check_columns
 from ..study.study_definition import Study
 from ..study.wanted_values import asks_for, checks_drives, needed

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ... import _core
+from ...interruptible_threads import thread_pool
 from ...model.shaft_ratio import turns
 from ...response.crossovers import bandwidth
 from ...simulation.scenario.scenario import Scenario
-from ...worker_threads import thread_pool
 from ..study.records_that_vary import kind_of_record
 from ..study.select_table import TASK_SHARES, USE
 from ..study.study_definition import Study

@@ -12,7 +12,7 @@ from ..inputs.arguments import checked
 from ..inputs.quantities import Count
 from ..inputs.refusal_messages import listed, shown
 from ..mujoco.attaching import alone_on_joint
-from ..mujoco.joints import compiled, mass_matrix
+from ..mujoco.joints_by_name import compiled, mass_matrix
 from ..simulation.batches.batch_parameters import mask_of_drives
 from ..simulation.scenario.scenario import Scenario
 from .drives import Drives

@@ -1,4 +1,4 @@
-"""The linear side: exact linearisation in any regime, and the closed forms (9) to (11) of the rigid drive."""
+"""Exact linearisation in any regime, and the closed forms (9) to (11) of the rigid drive."""
 
 from __future__ import annotations
 

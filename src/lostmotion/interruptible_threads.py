@@ -1,4 +1,4 @@
-"""Threads whose runs end with the block that started them."""
+"""Threads whose runs end with the block that started them, as by Ctrl-C."""
 
 from __future__ import annotations
 

@@ -5,7 +5,8 @@ from xml.etree import ElementTree as ET
 
 from ..model.train import DriveTrain
 from ..simulation.runs.results import installed_version
-from .fmu_model import (
+from .fmu_sources import SOURCES
+from .fmu_variables import (
     FIRST_DERIVATIVE,
     FIRST_INDICATOR,
     FIRST_INPUT,
@@ -21,7 +22,6 @@ from .fmu_model import (
     parameter_range,
     rate_unit,
 )
-from .fmu_sources import SOURCES
 
 TOLERANCE = "1e-8"  # relative, of integrators in Model Exchange
 

@@ -1,4 +1,4 @@
-"""Declarations of an FMU, for all versions of the standard, and its page."""
+"""Variables that an FMU declares, for all versions of the standard, their units, and its page."""
 
 import html
 import math

@@ -1,4 +1,4 @@
-"""Linear motion: slides, the screws, racks and belts that move them, and linear motors.
+"""Ball screws, and what all linear drives (screws, racks, belts) share.
 
 Slides enter the equations as shafts, and linear drives as gears. A slide is a shaft whose inertia is a mass [kg], whose angle is a
 position [m] and whose torques are forces [N]. A screw of lead p is a gear of ratio 2 pi/p between a shaft and a

@@ -13,9 +13,9 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.inputs.schema import unit_in_schema
 from lostmotion.live_page.description import describe
-from lostmotion.portable import fmi, fmu
+from lostmotion.portable import fmu_export, model_description
 from lostmotion.portable.derivation import derivation_of
-from lostmotion.portable.descriptions import numbers_of
+from lostmotion.portable.scenario_as_numbers import numbers_of
 from lostmotion.reports.page import render
 from lostmotion.reports.run import summary
 from lostmotion.reports.servo import servo_report
@@ -385,8 +385,8 @@ def test_no_unit_of_rotation_on_a_slide_in_an_fmu_or_the_live_page():
     assert units.pop("controllers.motor.position_encoder.error_phase") == "rad"  # of its sine
     assert set(units.values()) == {"m"}
     for version in (2, 3):
-        model = fmu._model(scenario, parameters, "0" * 32, True, ())
-        described = fmi.model_description(model, version).decode()
+        model = fmu_export._model(scenario, parameters, "0" * 32, True, ())
+        described = model_description.model_description(model, version).decode()
         assert rotary(re.findall(r"<\w+[^>]*name=\"[^>]*>", described)) == []
         assert 'unit="m/s"' in described
     page = describe(scenario, "axis")

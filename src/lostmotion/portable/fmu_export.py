@@ -29,10 +29,10 @@ from ..simulation.variables_of_trains import axis_variables
 from .checkout import made_here
 from .dependencies import dependencies_of
 from .derivation import Parameter, derivation_of
-from .descriptions import kernel_of, numbers_of, written
-from .fmi import model_description, terminals
-from .fmu_model import Declared, Model, page
 from .fmu_sources import source_files
+from .fmu_variables import Declared, Model, page
+from .model_description import model_description, terminals
+from .scenario_as_numbers import kernel_of, numbers_of, written
 
 # Directories and extensions of the libraries in an FMU, by the names that the builds have here.
 # FMI 2.0 leaves those beside x86-64 to the tools; these are the names of FMI 3.0.

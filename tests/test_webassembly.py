@@ -13,8 +13,8 @@ import pytest
 
 import lostmotion as lm
 from conftest import ALL_SCENARIOS
-from lostmotion.portable.descriptions import description, kernel_of
-from portable import END_STATE, ENERGIES, SAMPLES, PortableCore, bits, compiled
+from lostmotion.portable.scenario_as_numbers import description, kernel_of
+from webassembly import END_STATE, ENERGIES, SAMPLES, PortableCore, bits, compiled
 
 
 @cache
@@ -61,7 +61,7 @@ def test_node_gives_the_same_bits(tmp_path: Path) -> None:
         (tmp_path / kernel).mkdir(exist_ok=True)
         numbers = description(scenario, parameters=False)
         (tmp_path / kernel / f"{path.stem}.bin").write_bytes(numbers.astype("<f8").tobytes())
-    script = Path(__file__).with_name("portable.mjs")
+    script = Path(__file__).with_name("webassembly.mjs")
     for kernel, paths in of_kernel.items():
         words = ["node", str(script), str(compiled(kernel)), str(tmp_path / kernel)]
         told = json.loads(subprocess.run(words, capture_output=True, text=True, check=True).stdout)

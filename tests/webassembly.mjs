@@ -1,4 +1,4 @@
-// Runs each description of a directory in the WebAssembly module: node portable.mjs MODULE DIRECTORY
+// Runs each description of a directory in the WebAssembly module: node webassembly.mjs MODULE DIRECTORY
 // Prints the SHA-256 of each variable's samples.
 import { createHash } from "node:crypto";
 import { readFileSync, readdirSync } from "node:fs";
