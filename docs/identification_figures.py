@@ -9,7 +9,7 @@ from figure_files import save
 
 import lostmotion as lm
 from lostmotion.identification.rig.rig_runs import run_log
-from lostmotion.reports.looks import MEASURED, SECOND
+from lostmotion.reports.figure_style import MEASURED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
 EXAMPLE = Path(__file__).resolve().parent.parent / "examples" / "cycloidal"

@@ -9,7 +9,7 @@ import numpy as np
 from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports.looks import FIRST, MUTED, SECOND
+from lostmotion.reports.figure_style import FIRST, MUTED, SECOND
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.simulation.forms.key_aliases import DRIVE
 

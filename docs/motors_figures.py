@@ -8,9 +8,9 @@ import numpy as np
 from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports.looks import FAINT, FIRST, SECOND
+from lostmotion.reports.figure_style import FAINT, FIRST, SECOND
 from lostmotion.reports.panels import Curve, Panel
-from lostmotion.sizing.thermal import TwoBodies, mean_square
+from lostmotion.sizing.winding_temperature import TwoBodies, mean_square
 
 CYCLE = 20.0  # s: one second of acceleration, 4 s of rest, one of braking, and so on
 

@@ -13,7 +13,7 @@ from figure_files import save
 from PIL import Image
 
 from lostmotion.reports import plots
-from lostmotion.reports.looks import INK, LOOKS, MUTED
+from lostmotion.reports.figure_style import INK, LOOKS, MUTED
 from lostmotion.reports.panels import Curve, Panel
 
 EXAMPLES = Path(__file__).parent.parent / "examples"

@@ -12,7 +12,7 @@ from figure_files import save
 import lostmotion as lm
 from lostmotion.data_sheets.components import gearbox_table
 from lostmotion.reports import plots
-from lostmotion.reports.looks import FAINT, FIRST, INK, MUTED, PALETTE, SECOND
+from lostmotion.reports.figure_style import FAINT, FIRST, INK, MUTED, PALETTE, SECOND
 from lostmotion.reports.panels import Curve, Panel
 
 WORM, RATIO, STIFFNESS, LOAD = 1e-4, 50.0, 1e4, 20.0  # kg m2, -, N m/rad, N m: those of `worm-lowering`

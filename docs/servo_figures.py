@@ -8,7 +8,7 @@ import numpy as np
 from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports.looks import FIRST, SECOND, THIRD
+from lostmotion.reports.figure_style import FIRST, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.units.practical import ARCMIN
 

@@ -9,7 +9,7 @@ import numpy as np
 from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports.looks import FAINT, FIRST, SECOND, THIRD
+from lostmotion.reports.figure_style import FAINT, FIRST, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 
 FREQUENCY = 0.25

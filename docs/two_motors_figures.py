@@ -12,7 +12,7 @@ import numpy as np
 from figure_files import save
 
 import lostmotion as lm
-from lostmotion.reports.looks import FAINT, FIRST, POINTS, SECOND, THIRD
+from lostmotion.reports.figure_style import FAINT, FIRST, POINTS, SECOND, THIRD
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.studies.runs.read_table import read_table
 

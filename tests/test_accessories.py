@@ -10,8 +10,8 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
-from lostmotion.model.duty import Amplifier
-from lostmotion.reports.listing import list_records, record_text, template
+from lostmotion.model.process_loads import Amplifier
+from lostmotion.reports.catalogue_text import list_records, record_text, template
 from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
 from lostmotion.studies.runs.axis_pairs import Axes

@@ -8,14 +8,14 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.model.duty import ArmGravity, Duty, Payload, Process, Supply
+from lostmotion.model.process_loads import ArmGravity, Duty, Payload, Process, Supply
 from lostmotion.model.screw import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing.axis_rules import derated, emergency_stop, gearbox_life, holding_brake, output_bearing, with_safety
 from lostmotion.sizing.catalogue_formulas import derating
 from lostmotion.sizing.finding import TASK_RULES, within
+from lostmotion.sizing.linear_stage_demands import at_input, stage_of, together
 from lostmotion.sizing.required_motion import duty_torque, input_demand, required_motion
-from lostmotion.sizing.stages import at_input, stage_of, together
 from lostmotion.sizing.supply import electrical_power, returned, supply_rules
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.task_file import task_of

@@ -12,9 +12,9 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.data_sheets.accessory_sheets import AmplifierSheet
 from lostmotion.data_sheets.records import catalogue
-from lostmotion.model.duty import Amplifier
+from lostmotion.model.process_loads import Amplifier
 from lostmotion.model.rack_and_belt import RatedBelt
-from lostmotion.reports.listing import record_text
+from lostmotion.reports.catalogue_text import record_text
 from lostmotion.servo.tuning import drive_units
 from lostmotion.sizing.axis_rules import belt_rules
 from lostmotion.sizing.belt_ratings import of_profile, working_tension

@@ -20,7 +20,7 @@ from lostmotion.cli import app, terminal
 from lostmotion.data_sheets.motor_sheet import STEPPER_DATA
 from lostmotion.data_sheets.records import table_of
 from lostmotion.reports import plots, thinning
-from lostmotion.reports.listing import list_records
+from lostmotion.reports.catalogue_text import list_records
 from lostmotion.simulation.runs.run import run
 from lostmotion.simulation.runs.run_time_forecast import forecast
 from refusals import refused

@@ -82,7 +82,7 @@ INNER = {
         {"hunting"},
         {"settling", "tuning_result"},
         {"tuning"},
-        {"commission"},
+        {"commissioning_report"},
     ],
 }
 MODULES = sorted(p.relative_to(PACKAGE).with_suffix("") for p in PACKAGE.rglob("*.py"))

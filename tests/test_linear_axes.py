@@ -19,7 +19,7 @@ from lostmotion.portable.scenario_as_numbers import numbers_of
 from lostmotion.reports.page import render
 from lostmotion.reports.run import summary
 from lostmotion.reports.servo import servo_report
-from lostmotion.simulation.forms.dotted_keys import set_values
+from lostmotion.simulation.forms.set_by_dotted_key import set_values
 from lostmotion.simulation.forms.train_tables import train_schema
 from refusals import refused
 

@@ -13,7 +13,7 @@ from lostmotion.data_sheets.linear_components import linear_table
 from lostmotion.data_sheets.records import KINDS, catalogue, find, parse_sheets, table_of
 from lostmotion.data_sheets.train_components import RECORD_KINDS, RECORDS
 from lostmotion.model.train import DriveTrain
-from lostmotion.reports.listing import list_records, record_text, template
+from lostmotion.reports.catalogue_text import list_records, record_text, template
 from lostmotion.simulation.forms.train_tables import TrainTables
 from refusals import refused
 

@@ -17,7 +17,7 @@ from lostmotion.errors import InputError
 from lostmotion.live_page.description import describe
 from lostmotion.portable.derivation import derivation_of
 from lostmotion.portable.scenario_as_numbers import numbers_of
-from lostmotion.simulation.forms.dotted_keys import set_values
+from lostmotion.simulation.forms.set_by_dotted_key import set_values
 from refusals import refused
 
 AXIS = """title = "A slide with a linear motor"

@@ -10,7 +10,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from lostmotion.data_sheets.components import motor_table
 from lostmotion.sizing.drive_check import check_drive
-from lostmotion.sizing.thermal import COPPER, TwoBodies, mean_square
+from lostmotion.sizing.winding_temperature import COPPER, TwoBodies, mean_square
 from refusals import refused
 
 THERMAL = {

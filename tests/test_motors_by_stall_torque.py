@@ -13,7 +13,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from lostmotion.model.losses import LossMap
 from lostmotion.reproducible import interpolate
-from lostmotion.sizing.thermal import COPPER, TwoBodies
+from lostmotion.sizing.winding_temperature import COPPER, TwoBodies
 from refusals import refused
 
 SERVO: dict[str, Any] = {

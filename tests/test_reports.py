@@ -15,19 +15,19 @@ import lostmotion as lm
 from conftest import ROOT
 from html_pages import Page, charts
 from lostmotion.cli import app
-from lostmotion.reports import looks, panels, plots
+from lostmotion.reports import figure_style, panels, plots
 from lostmotion.reports import page as pages
 from lostmotion.reports.contours import contours
-from lostmotion.reports.looks import LOOKS, STYLES, look
+from lostmotion.reports.figure_style import LOOKS, STYLES, look
 from lostmotion.reports.packed import packed
 from lostmotion.reports.page import Report, Table, render
-from lostmotion.reports.pages import write_report
 from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Mark, Matrix, Panel
 from lostmotion.reports.pictures import endings
 from lostmotion.reports.run import run_report
 from lostmotion.reports.servo import servo_report
-from lostmotion.reports.static import svg_of
+from lostmotion.reports.svg_charts import svg_of
 from lostmotion.reports.thinning import simplified
+from lostmotion.reports.written_files import write_report
 from lostmotion.units.practical import ARCMIN, practical
 from lostmotion.verdict import Verdict
 from refusals import refused
@@ -188,7 +188,7 @@ def test_figures_are_drawn_where_they_are_asked_for(axis: lm.servo.ServoReport, 
 
 def test_a_report_takes_no_plotting_library_along() -> None:
     modules = sorted(path.stem for path in Path(pages.__file__).parent.glob("*.py"))
-    drawing = {"plots", "other_plots", "hunting_figures", "pictures"}
+    drawing = {"plots", "bar_and_matrix_plots", "hunting_figures", "pictures"}
     reports = [f"lostmotion.reports.{name}" for name in modules if name not in drawing]
     code = f"import sys, {', '.join(reports)}; print('matplotlib' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
@@ -251,7 +251,7 @@ def drawn(*charts: panels.Chart, columns: int = 2) -> Any:
 def test_legends_of_pictures_cover_no_curves() -> None:
     x = np.linspace(0.0, 1.0, 5)
     names = ("motor speed / ratio", "load speed", "reference")
-    curves = tuple(panels.Curve(name, x, k * x, looks.look(k)) for k, name in enumerate(names))
+    curves = tuple(panels.Curve(name, x, k * x, figure_style.look(k)) for k, name in enumerate(names))
     contacts = panels.Contacts("contacts", x, {"motor": np.array([0, 1, 1, -1, 0])})
     figure = drawn(panels.Panel("speed", "time [s]", "speed [rad/s]", curves), contacts)
     for axes, labels in zip(figure.axes, (list(names), ["stuck", "slips (up forward, down reverse)"]), strict=True):
@@ -263,9 +263,9 @@ def test_legends_of_pictures_cover_no_curves() -> None:
 
 def test_texts_of_marks_do_not_cover_each_other() -> None:
     x = np.geomspace(1.0, 100.0, 9)
-    marks = [panels.Mark(10.0 + 0.1 * k, 0.1 - 1e-3 * k, f"{60 + k}.5°", looks.look(k)) for k in range(3)]
-    marks.append(panels.Mark(10.0, 0.1, "60.5°", looks.look(3)))  # which is written already
-    curve = panels.Curve("falling", x, 1.0 / x, looks.look(0))
+    marks = [panels.Mark(10.0 + 0.1 * k, 0.1 - 1e-3 * k, f"{60 + k}.5°", figure_style.look(k)) for k in range(3)]
+    marks.append(panels.Mark(10.0, 0.1, "60.5°", figure_style.look(3)))  # which is written already
+    curve = panels.Curve("falling", x, 1.0 / x, figure_style.look(0))
     panel = panels.Panel("gain", "frequency [Hz]", "gain [-]", (curve,), log_x=True, log_y=True, marks=tuple(marks))
     (axes,) = drawn(panel, columns=1).axes
     boxes = [text.get_window_extent() for text in axes.texts]
@@ -275,7 +275,7 @@ def test_texts_of_marks_do_not_cover_each_other() -> None:
 
 def test_an_axis_with_hundreds_of_names_shows_a_few() -> None:
     names = tuple(f"gearbox-{k}" for k in range(227))
-    dots = panels.Curve("energy", np.arange(227.0), np.arange(227.0), looks.DOTS)
+    dots = panels.Curve("energy", np.arange(227.0), np.arange(227.0), figure_style.DOTS)
     (axes,) = drawn(panels.Panel("energy", "gearbox", "energy [J]", (dots,), x_names=names), columns=1).axes
     shown = [text.get_text() for text in axes.get_xticklabels()]
     assert shown == list(names[::10])

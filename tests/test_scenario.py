@@ -16,8 +16,8 @@ from lostmotion.model.gearbox import GearboxLimits
 from lostmotion.model.losses import LossMap
 from lostmotion.model.motor import MotorLimits
 from lostmotion.model.torsion import Hysteresis, TorsionCurve
-from lostmotion.simulation.forms.dotted_keys import set_values
 from lostmotion.simulation.forms.drive_tables import DriveTables, LoadTable, drive_schema
+from lostmotion.simulation.forms.set_by_dotted_key import set_values
 from refusals import refused, refuses
 
 

@@ -25,7 +25,7 @@ from lostmotion.cli import app
 from lostmotion.identification.readers import servo_json_logs, spreadsheet_logs, text_logs
 from lostmotion.identification.readers.channel_conversions import conversion_of
 from lostmotion.identification.readers.log_files import READERS, read_log
-from lostmotion.inputs.limits import memory_limit, size_of
+from lostmotion.inputs.memory_limits import memory_limit, size_of
 
 TIME = np.arange(200) * 0.01
 

@@ -242,14 +242,14 @@ def test_intervals_that_no_motion_can_have_are_refused():
 
 
 def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):
-    monkeypatch.setattr("lostmotion.inputs.limits.free_memory", lambda: 5_000_000_000)
+    monkeypatch.setattr("lostmotion.inputs.memory_limits.free_memory", lambda: 5_000_000_000)
     with refuses(match=r"1e\+08 samples need 18\.3 GB of memory, and 5 GB are free"):
         lm.simulate(lm.load("paper-2dof-nl-small"), duration=100.0, sample_interval=1.0000001e-6)
 
 
 def test_results_that_do_not_fit_into_memory_are_refused_before_they_are_made(monkeypatch):
     """A thousand times a thousand points, with at least 16 bytes for each harmonic of each output."""
-    monkeypatch.setattr("lostmotion.inputs.limits.free_memory", lambda: 1_000_000_000)
+    monkeypatch.setattr("lostmotion.inputs.memory_limits.free_memory", lambda: 1_000_000_000)
     drive, many = lm.load("paper-2dof-nl-small"), np.linspace(1.0, 2.0, 1000)
     for call, said in (
         (lambda: lm.frequency_response(drive, many, many), r"1e\+06 points of the response need .* GB"),

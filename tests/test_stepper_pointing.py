@@ -166,8 +166,8 @@ def test_a_mount_that_loses_steps_does_not_fit():
 
 
 def test_the_report_of_a_mount_is_in_arcsec_and_lists_its_orders(tmp_path):
-    from lostmotion.reports.pages import write_report
     from lostmotion.reports.pointing import header, order_rows, pointing_report
+    from lostmotion.reports.written_files import write_report
 
     budget = lm.pointing_budget(mount(worm=10.0 * ARCSEC), after=1.0, robustness=False)
     assert "rms [arcsec]" in header(budget)

@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import ROOT
-from lostmotion.sizing.thermal import rms
+from lostmotion.sizing.winding_temperature import rms
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.study.study_definition import Study
 

@@ -9,7 +9,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
-from lostmotion.model.duty import Supply
+from lostmotion.model.process_loads import Supply
 from lostmotion.model.task import Task
 from lostmotion.sizing.axis_task.axis_task import AxisTask
 from lostmotion.sizing.finding import TASK_RULES

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from lostmotion.model.duty import Duty, Supply
+from lostmotion.model.process_loads import Duty, Supply
 from lostmotion.model.screw import RatedScrew
 from lostmotion.simulation.forms.drive_tables import LoadTable
 from lostmotion.sizing import catalogue_formulas
@@ -14,7 +14,7 @@ from lostmotion.sizing.axis_rules import screw_rules
 from lostmotion.sizing.life import axial_load, mean_load, nominal_life, screw_mean_load
 from lostmotion.sizing.required_motion import RequiredMotion, required_motion
 from lostmotion.sizing.supply import returned, supply_rules
-from lostmotion.sizing.thermal import rms
+from lostmotion.sizing.winding_temperature import rms
 
 RPM = 30.0 / math.pi
 GRAVITY = 9.807  # that of THK's examples

@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 import lostmotion as lm
-from lostmotion.reports.pages import table_csv
+from lostmotion.reports.written_files import table_csv
 
 MODELS = {"PaperDrive": "paper-2dof-nl-small", "PositionAxis": "position-axis"}
 PLATFORM = "linux64"

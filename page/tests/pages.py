@@ -15,7 +15,7 @@ import numpy as np
 import lostmotion as lm
 from lostmotion.live_page.page import write_page
 from lostmotion.reports.drive_check import check_report
-from lostmotion.reports.looks import DOTS, look
+from lostmotion.reports.figure_style import DOTS, look
 from lostmotion.reports.page import Prose, Report, Table, render
 from lostmotion.reports.panels import Bars, Contacts, Curve, Flows, Ground, Group, Histogram, Mark, Matrix, Panel
 from lostmotion.reports.response import response_report

@@ -48,7 +48,7 @@ from .response.harmonic import frequency_response as frequency_response
 from .response.linearisation import linearize as linearize
 from .response.shooting import periodic_motion as periodic_motion
 from .response.spectrum import spectrum as spectrum
-from .servo.commission import commission as commission
+from .servo.commissioning_report import commission as commission
 from .servo.hunting.certificate import hunting_certificate as hunting_certificate
 from .servo.tuning import tune as tune
 from .simulation.batches.simulation_batch import SimulationBatch as SimulationBatch

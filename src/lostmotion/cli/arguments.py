@@ -73,7 +73,7 @@ def decibels(text: str) -> float:
 def load_scenario(source: str, overrides: list[str] | None, missing: list[str] | None = None) -> Scenario:
     """The scenario of a command, bare numbers of `--set` printed with the unit in which they are read. With a list for their keys
     its gains may be missing."""
-    from ..simulation.forms.dotted_keys import key_and_value
+    from ..simulation.forms.set_by_dotted_key import key_and_value
     from ..simulation.scenario.units_of_keys import unit_for
 
     if missing is None:

@@ -31,7 +31,7 @@ def catalogue(
 
     Without an option: how many records of each kind there are. The list has a column with the level of the model, or the missing data.
     """
-    from ..reports.listing import list_records, record_text, summary, template
+    from ..reports.catalogue_text import list_records, record_text, summary, template
 
     if name == "new":
         text = template(kind)
@@ -39,7 +39,7 @@ def catalogue(
             print(text, end="")
             return
         from ..errors import InputError
-        from ..reports.pages import write_text
+        from ..reports.written_files import write_text
 
         if output.exists():
             raise InputError(f"{output}: exists; name another file")

@@ -110,7 +110,7 @@ def _limit_memory(text: str | None) -> None:
     """Take the limit for this command and for the processes that it starts."""
     if text is None:
         return
-    from ..inputs.limits import VARIABLE, size_of
+    from ..inputs.memory_limits import VARIABLE, size_of
 
     try:
         size_of(text)

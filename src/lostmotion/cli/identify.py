@@ -124,7 +124,7 @@ def _write_template(path: Path, kind: str) -> None:
     """Write a rig whose values are to be filled in."""
     from importlib.resources import files
 
-    from ..reports.pages import write_text
+    from ..reports.written_files import write_text
 
     write_text(path, (files("lostmotion") / "identification" / f"{kind}-template.toml").read_text(encoding="utf-8"))
     print(f"Template of a rig written to {path}: put in what is known of yours")

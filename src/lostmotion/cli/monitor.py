@@ -44,7 +44,7 @@ def monitor(
     else:
         with writing(output), busy("Writing"):
             from ..reports.monitor import monitor_report
-            from ..reports.pages import write_report
+            from ..reports.written_files import write_report
 
             page = write_report(output, monitor_report(file.stem, result), pictures)
         print(f"Report written to {page}")

@@ -67,7 +67,7 @@ def rig(
     report, notes = _measured(name, sheet, overrides or ())
     from ..reports import rig as of_gearbox
     from ..reports import screw_rig as of_screw
-    from ..reports.pages import write_report
+    from ..reports.written_files import write_report
 
     pages: Any = of_screw if isinstance(sheet, ScrewSheet) else of_gearbox
     page = None

@@ -25,7 +25,7 @@ from .terminal import about, busy, conclude, console, progress
 
 if TYPE_CHECKING:
     from ..errors import InputError
-    from ..servo.commission import ServoReport
+    from ..servo.commissioning_report import ServoReport
     from ..servo.tuning_result import Tuning
     from ..simulation.scenario.scenario import Scenario
 
@@ -111,7 +111,7 @@ def servo(
         options_of_loops = {"--tune": rule, "--drive-units": drive_units or None}
         _open_loop(loaded, scenario, motor, window, options_of_loops, directories, pictures, again(scenario, overrides))
         return
-    from ..servo.commission import commission, work
+    from ..servo.commissioning_report import commission, work
 
     with about(scenario):
         total = work(loaded, motor)
@@ -127,8 +127,8 @@ def servo(
         written.append(f"Tuned scenario written to {path}")
     for path in directories:
         with writing(path), busy("Writing"):
-            from ..reports.pages import write_report
             from ..reports.servo import servo_report
+            from ..reports.written_files import write_report
 
             page = write_report(path, servo_report(Path(scenario).stem, report), pictures)
             written.append(f"Report written to {page}")
@@ -175,8 +175,8 @@ def _open_loop(
 ) -> None:
     """Print what can be said of the axis of a stepper, which has no loop, with its page on request."""
     from ..errors import InputError
-    from ..reports.open_loop import open_loop_report
-    from ..reports.pages import write_report
+    from ..reports.stepper_axis import open_loop_report
+    from ..reports.written_files import write_report
     from ..simulation.runs.pointing_error import pointed
     from ..sizing.stepper_axis import NO_LOOP, open_loop
     from ..units.conversion import si_value
@@ -213,7 +213,7 @@ def _certify(
     """Print whether an axis with a continuous controller hunts, with its page on request."""
     from ..errors import InputError
     from ..reports.certificate import certificate_report, certificate_rows, verdict_of
-    from ..reports.pages import write_report
+    from ..reports.written_files import write_report
     from ..servo.hunting.certificate import hunting_certificate
 
     if given := [option for option, value in asked.items() if value is not None]:

@@ -81,8 +81,8 @@ def track(
         print(f"All charts on a page: lostmotion track {again(scenario, overrides)} -o track")
     else:
         with writing(output), busy("Writing"):
-            from ..reports.pages import write_report
             from ..reports.pointing import pointing_report
+            from ..reports.written_files import write_report
 
             page = write_report(output, pointing_report(Path(scenario).stem, budget), pictures)
         print(f"Report written to {page}")

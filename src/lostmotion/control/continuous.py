@@ -11,7 +11,7 @@ from pydantic import Field
 
 from .. import _core
 from ..errors import InputError, inside, need
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.part import Part, rule
 from ..inputs.quantities import (
     Angle,

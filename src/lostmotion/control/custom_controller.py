@@ -9,7 +9,7 @@ from typing import Any
 
 from .. import _core
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.refusal_messages import shown
 
 C_FUNCTION: Any = ctypes.CFUNCTYPE(None).__mro__[1]  # the class of all function pointers

@@ -10,7 +10,7 @@ from pydantic import Field
 from .. import _core
 from ..errors import InputError
 from ..inputs import core_parameters
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.part import rule
 
 

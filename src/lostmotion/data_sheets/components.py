@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, TypeVar
 
 from ..errors import InputError, prefixed
-from ..inputs.arguments import RecordName, checked
+from ..inputs.argument_checks import RecordName, checked
 from ..inputs.implausible_values import doubt
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Inertia, NotNegative, Number, Positive, Temperature, argument

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any, TypeAlias, get_args
 
 from ..errors import InputError, prefixed
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.refusal_messages import names_like, shown, unknown_key
 from ..inputs.toml_files import is_in_file, read_toml
 from .accessory_sheets import AmplifierSheet, BrakeSheet

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from .fit.least_squares import slope_of
 from .preparation.prepare import prepared
 from .readers.log import Log

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from ..errors import prefixed
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count
 from .candidate_models import RungResult, begun_with, chosen, climb, first_fit, is_rough
 from .fit.input_courses import Way, as_recorded, nearer_ways

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..atomic_writer import write_bytes
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count
 from ..inputs.toml_text import toml_text
 from ..model.angle_torques import TorqueHarmonic

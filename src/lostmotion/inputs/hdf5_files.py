@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from .limits import LOG, check_memory
+from .memory_limits import LOG, check_memory
 
 DEFLATE, SHUFFLE, CHECKSUM, LZF = 1, 2, 3, 32000
 FILTERS = {DEFLATE, SHUFFLE, CHECKSUM, LZF}

@@ -14,7 +14,7 @@ from ..errors import InputError
 from ..units.scalars import plain
 from .display import abridged
 from .docstrings import docstring_of
-from .parameters import PartType, written_docstring
+from .parameter_help import PartType, written_docstring
 from .refusal_messages import refusal, shown
 
 

@@ -9,7 +9,7 @@ from typing import Any
 
 from ..errors import InputError
 from .implausible_values import doubt_all
-from .limits import read_text
+from .memory_limits import read_text
 
 PER_BYTE = 16  # bytes of memory for each byte of a TOML file, measured
 RESULTS = (".nc", ".csv", ".parquet")  # endings of saved results

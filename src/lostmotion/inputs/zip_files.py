@@ -3,7 +3,7 @@
 import zipfile
 
 from ..errors import InputError
-from .limits import check_memory
+from .memory_limits import check_memory
 
 METHODS = {zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED}  # the others are decompressed without a limit by the library
 ENCRYPTED = 1  # flag of a member

@@ -4,7 +4,7 @@ import math
 from typing import Any
 
 from ..errors import InputError
-from ..servo.commission import LoopSheet, loop_sheet
+from ..servo.commissioning_report import LoopSheet, loop_sheet
 from ..servo.linear_regimes import axis_of, regimes
 from ..simulation.scenario.scenario import Scenario
 

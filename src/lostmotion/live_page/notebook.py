@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count
 from ..simulation.scenario.scenario import Scenario
 from .page import page, write_page

@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import field_validator
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.core_parameters import MotorFields, ShaftMotorFields
 from ..inputs.part import Part, rule
 from ..inputs.quantities import (

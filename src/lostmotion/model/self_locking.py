@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Literal
 
 from .. import _core
 from ..errors import InputError, prefixed
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Speed, Torque
 from ..inputs.refusal_messages import did_you_mean
 from .gear import Gear

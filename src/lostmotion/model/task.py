@@ -4,7 +4,7 @@ from typing import Annotated
 
 from ..inputs.part import Part
 from ..inputs.quantities import Angle, Positive, Switch, Temperature, Time
-from .duty import Amplifier, Bus, HoldingBrake
+from .process_loads import Amplifier, Bus, HoldingBrake
 
 
 class Task(Part):

@@ -12,7 +12,7 @@ from ..data_sheets.actuator_sheet import ActuatorSheet
 from ..data_sheets.components import actuator, gearbox
 from ..data_sheets.records import catalogue
 from ..errors import InputError, need, prefixed
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.drive import Drive
 from ..model.load import Load

@@ -12,7 +12,7 @@ import numpy as np
 
 from ..control.continuous import ContinuousController
 from ..errors import InputError, need, prefixed
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.named_elements import Named
 from ..inputs.quantities import Number
 from ..model.drive import Drive

@@ -11,7 +11,7 @@ from .. import _core
 from ..control.command import CommandSignal
 from ..control.controller import Controller
 from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..portable.checkout import made_here
 from ..portable.derivation import Derivation
 from ..portable.scenario_as_numbers import written

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.named_elements import Named
 from ..inputs.quantities import Frequency, argument
 from ..inputs.refusal_messages import shown

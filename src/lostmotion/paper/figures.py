@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.losses import LossMap
-from ..reports.looks import FAINT, LEVEL, STYLES, step
-from ..reports.pages import panels_csv, table_csv
+from ..reports.figure_style import FAINT, LEVEL, STYLES, step
+from ..reports.written_files import panels_csv, table_csv
 from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
 from ..response.crossovers import THREE_DECIBELS
 from ..response.rigid import rigid_constants

@@ -3,8 +3,8 @@
 import re
 
 from ..reports.page import cards, document, verdict
-from ..reports.pages import render_page
 from ..reports.panels import Chart, scientific
+from ..reports.written_files import render_page
 from .figures import FigureSpec
 from .published_drive import AMPLITUDES, MODELS, Constant
 from .quoted_numbers import Facts

@@ -3,8 +3,8 @@
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
-from ..reports.pages import table_csv, write_text
 from ..reports.pictures import save, side_by_side
+from ..reports.written_files import table_csv, write_text
 from . import runs
 from .figures import FIGURES, FigureSpec, draw, figure_csv, figure_specs
 from .published_drive import Constant, constants

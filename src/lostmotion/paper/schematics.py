@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from xml.etree import ElementTree
 
-from ..reports.looks import COLOURS, INK, SMALLEST
+from ..reports.figure_style import COLOURS, INK, SMALLEST
 from ..reports.panels import Drawing
 
 if TYPE_CHECKING:

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import argument
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..interruptible_threads import thread_pool

@@ -12,7 +12,7 @@ from ..inputs.named_elements import Named
 from ..inputs.part import Part
 from ..inputs.quantities import Limit
 from ..recorded_numbers import Tape
-from ..simulation.forms.dotted_keys import CHANGES_OTHERS
+from ..simulation.forms.set_by_dotted_key import CHANGES_OTHERS
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.scenario.units_of_keys import limit_in, meaning_in, unit_for
 

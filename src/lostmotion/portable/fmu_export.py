@@ -17,7 +17,7 @@ import numpy as np
 from .. import _core
 from ..atomic_writer import write_whole
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.train import DriveTrain

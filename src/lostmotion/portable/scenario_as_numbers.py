@@ -7,7 +7,7 @@ import numpy as np
 from .. import _core
 from ..control.axis import OPEN_LOOP
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..simulation.runs.core_runs import core_case
 from ..simulation.scenario.requirements import need_ideal_current
 from ..simulation.scenario.scenario import Scenario

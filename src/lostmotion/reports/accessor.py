@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import xarray as xr
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.refusal_messages import shown
 from ..response.harmonic import of_output
 from ..simulation.runs.results import energy_of, scenario_of, whole

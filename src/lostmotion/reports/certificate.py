@@ -7,7 +7,7 @@ import numpy as np
 from ..servo.hunting.certificate import HuntingCertificate, certified_in_words
 from ..units.practical import practical
 from ..verdict import State, Verdict
-from .looks import FAINT, look
+from .figure_style import FAINT, look
 from .page import Prose, Report, Table
 from .panels import Curve, Group, Mark, Panel
 

@@ -10,7 +10,7 @@ from ..errors import InputError
 from ..units.practical import charted, printed
 from . import plots
 from .contours import contours
-from .looks import INK, MUTED, SMALLEST, map_colours
+from .figure_style import INK, MUTED, SMALLEST, map_colours
 
 if TYPE_CHECKING:
     import xarray

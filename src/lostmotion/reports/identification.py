@@ -20,10 +20,10 @@ from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_factor
 from ..units.practical import ARCMIN, printed
-from .looks import FAINT, MEASURED, PALETTE, look
+from .figure_style import FAINT, MEASURED, PALETTE, look
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report, write_text
 from .panels import Curve, Group, Matrix, Panel
+from .written_files import table_csv, write_report, write_text
 
 CLOUD: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 1.6, "alpha": 0.4}
 FIRST = 4  # overlays before the tables

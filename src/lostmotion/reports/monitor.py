@@ -10,10 +10,10 @@ from ..identification.monitor.trends import RESIDUAL, Watched
 from ..identification.task.free_parameters import in_unit
 from ..units.conversion import si_factor
 from ..units.practical import printed
-from .looks import FAINT, PALETTE
+from .figure_style import FAINT, PALETTE
 from .page import Prose, Report, Table
-from .pages import table_csv
 from .panels import Curve, Group, Panel
+from .written_files import table_csv
 
 VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5.0}
 BEGIN: dict[str, Any] = VALUES | {"color": PALETTE["second"], "markersize": 9.0}

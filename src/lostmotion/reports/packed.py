@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from .looks import INK, PALETTE, STEPS
+from .figure_style import INK, PALETTE, STEPS
 from .panels import Chart, Contacts, Curve, Flows, Mark, Panel
 from .thinning import thinned
 

@@ -15,7 +15,7 @@ from ..portable.checkout import made_here
 from ..verdict import State, Verdict
 from .packed import packed
 from .panels import Bars, Chart, Contacts, Drawing, Flows, Ground, Group, Histogram, Matrix, Panel
-from .static import svg_of, swatch
+from .svg_charts import svg_of, swatch
 
 HERE = Path(__file__).parent
 SCRIPT = HERE / "report.js"  # `make page-report` puts it there, and the wheel carries it

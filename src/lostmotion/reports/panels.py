@@ -1,4 +1,4 @@
-"""Content of a figure before it is drawn. Pages carry it as data (`packed`, `static`); `plots` draws them as pictures."""
+"""Content of a figure before it is drawn. Pages carry it as data (`packed`, `svg_charts`); `plots` draws them as pictures."""
 
 import math
 from collections.abc import Mapping

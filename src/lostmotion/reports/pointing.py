@@ -13,10 +13,10 @@ from ..pointing.budget import Errors, PointingBudget, PointingError
 from ..units.practical import ROUNDING as ROUNDED
 from ..units.practical import excess, told_apart
 from ..verdict import Point, Verdict
-from .looks import FAINT, look
+from .figure_style import FAINT, look
 from .page import Prose, Report, Table
-from .pages import table_csv
 from .panels import Bars, Curve, Group, Panel
+from .written_files import table_csv
 
 NUMBERS = ("rms", "peak", "probable", "mean", "measured, rms")
 ARCSEC = 648_000.0 / math.pi

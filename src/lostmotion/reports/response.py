@@ -14,10 +14,10 @@ from ..atomic_writer import write_bytes
 from ..response.crossovers import characteristics
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import counted, printed
-from .looks import step
+from .figure_style import step
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report
 from .panels import Curve, Ground, Group, Panel
+from .written_files import table_csv, write_report
 
 if TYPE_CHECKING:
     import xarray

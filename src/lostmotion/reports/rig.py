@@ -12,11 +12,11 @@ from ..test_rig.measurement import RigReport
 from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import ARCMIN, RPM, counted, practical
 from ..verdict import Point, Verdict
-from .looks import DOTS, step
+from .data_sheet_rows import rows_of, rows_of_part
+from .figure_style import DOTS, step
 from .page import Prose, Report, Table
-from .pages import table_csv
 from .panels import Curve, Group, Panel
-from .sheet_rows import rows_of, rows_of_part
+from .written_files import table_csv
 
 PRINTED = 0.05  # half of the last of two digits, to which data sheets print at least
 MEASURED = (

@@ -18,7 +18,7 @@ from ..model.train import DriveTrain
 from ..simulation.runs.results import energy_of, scenario_of
 from ..simulation.runs.separate_trains import parts_of
 from ..units.practical import ARCMIN, charted
-from .looks import FAINT, look
+from .figure_style import FAINT, look
 from .panels import Chart, Contacts, Curve, Flows, Ground, Panel
 
 if TYPE_CHECKING:

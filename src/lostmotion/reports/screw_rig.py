@@ -10,11 +10,11 @@ from ..test_rig.screw_rig import RATED
 from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import RPM
 from ..verdict import Verdict
-from .looks import DOTS, step
+from .figure_style import DOTS, step
 from .page import Report
-from .pages import table_csv
 from .panels import Curve, Group, Panel
 from .rig import agreement, compared_rows, rig_parts
+from .written_files import table_csv
 
 MEASURED = (
     "Deflection: the input is locked and the force on the slide goes through slow ramps. Efficiency: a flywheel keeps the screw at its speed against the force; it "

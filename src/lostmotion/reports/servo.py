@@ -9,14 +9,14 @@ from typing import Any
 import numpy as np
 
 from ..servo.axis_runs import StepResponse
-from ..servo.commission import TRUE, LoopSheet, ServoReport, decibels
+from ..servo.commissioning_report import TRUE, LoopSheet, ServoReport, decibels
 from ..servo.hunting.limit_cycle_causes import LimitCycle
 from ..units.practical import charted
 from .certificate import certificate_parts
-from .looks import FAINT, look
+from .figure_style import FAINT, look
 from .page import Prose, Report, Table
-from .pages import table_csv
 from .panels import Curve, Group, Mark, Panel
+from .written_files import table_csv
 
 DEGREES = 180.0 / math.pi
 LEAD = 2.0  # [deg] of a phase from which on it begins a turn below

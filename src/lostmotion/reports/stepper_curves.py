@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING
 
-from .looks import LOOKS
+from .figure_style import LOOKS
 from .panels import Curve, Panel
 
 if TYPE_CHECKING:

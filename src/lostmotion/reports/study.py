@@ -15,11 +15,11 @@ from ..studies.study.study_definition import Study
 from ..studies.study.vary import Vary
 from ..units.practical import counted, printed
 from ..verdict import Verdict
-from .looks import PALETTE
+from .figure_style import PALETTE
 from .page import Prose, Report, Table
-from .pages import table_csv, write_report
 from .panels import Bars, Curve, Group, Histogram, Panel
 from .study_selection import show_selection, shown_in, words
+from .written_files import table_csv, write_report
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -18,10 +18,10 @@ from ..studies.study.select_table import TASK_SHARES, USE, Selection
 from ..studies.study.study_definition import Study
 from ..units.practical import PRACTICAL, counted, printed
 from ..verdict import Point, Verdict
-from .looks import OTHERS, PALETTE, look
+from .figure_style import OTHERS, PALETTE, look
 from .page import Table
-from .pages import table_csv
 from .panels import Curve, Group, Panel
+from .written_files import table_csv
 
 if TYPE_CHECKING:
     import pyarrow as pa

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Frequency, Number, Torque
 from ..model.drive import Drive
 from ..simulation.runs.stuck_contacts import smallest_commands

@@ -11,8 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.arguments import checked
-from ..inputs.limits import check_free
+from ..inputs.argument_checks import checked
+from ..inputs.memory_limits import check_free
 from ..inputs.quantities import Count, Number, Torque, arguments
 from ..model.drive import Drive
 from ..simulation.scenario.scenario import Scenario

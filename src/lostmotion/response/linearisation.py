@@ -10,7 +10,7 @@ import numpy as np
 
 from .. import _core
 from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Number, Time, Torque, argument, arguments
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.drive import Drive

@@ -11,7 +11,7 @@ import numpy as np
 from .. import _core
 from ..control.command import CommandSignal
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count, Number, Torque
 from ..model.drive import Drive
 from ..model.signals import Signal, TorqueSignal, constant_or

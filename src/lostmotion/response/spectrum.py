@@ -11,7 +11,7 @@ import numpy as np
 
 from ..control.references import PositionReference, SlideReference
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Number, Time
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..model.angle_torques import AngleCurve, Harmonic, PositionHarmonic

@@ -1,9 +1,9 @@
 from ..verdict import Verdict as Verdict
 from .axis_runs import Following as Following
 from .axis_runs import StepResponse as StepResponse
-from .commission import LoopSheet as LoopSheet
-from .commission import ServoReport as ServoReport
-from .commission import Stiffness as Stiffness
+from .commissioning_report import LoopSheet as LoopSheet
+from .commissioning_report import ServoReport as ServoReport
+from .commissioning_report import Stiffness as Stiffness
 from .hunting.certificate import FixedPoint as FixedPoint
 from .hunting.certificate import HuntingCertificate as HuntingCertificate
 from .hunting.hunting import Hunting as Hunting

@@ -22,7 +22,7 @@ from ..control.gain_rules import (
     symmetrical_optimum,
 )
 from ..errors import InputError, need
-from ..inputs.arguments import ScenarioName, checked
+from ..inputs.argument_checks import ScenarioName, checked
 from ..inputs.quantities import Angle, Frequency, Number
 from ..inputs.refusal_messages import did_you_mean, shown
 from ..simulation.scenario.scenario import Scenario

@@ -10,10 +10,10 @@ from pathlib import Path
 from typing import Any, Literal
 
 from ..errors import InputError, need
-from ..inputs.arguments import ScenarioName, checked
+from ..inputs.argument_checks import ScenarioName, checked
 from ..inputs.schema import follow, unit_in_schema
 from ..simulation.forms.axis_form import file_schema
-from ..simulation.forms.dotted_keys import parse_override
+from ..simulation.forms.set_by_dotted_key import parse_override
 from ..simulation.forms.slide_units import unit_of_slides
 from ..simulation.runs.loading import load
 from ..simulation.scenario.scenario import Scenario

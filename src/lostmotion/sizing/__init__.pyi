@@ -5,9 +5,9 @@ from ..model.self_locking import self_locking as self_locking
 from ..model.stepper import pull_out_torque as pull_out_torque
 from .finding import Finding as Finding
 from .finding import Findings as Findings
-from .motor_run import motor_current as motor_current
-from .motor_run import temperatures as temperatures
+from .motor_quantities import motor_current as motor_current
+from .motor_quantities import temperatures as temperatures
 from .pull_out_curves import stepper_curves as stepper_curves
 from .stepper_axis import OpenLoop as OpenLoop
 from .stepper_axis import open_loop as open_loop
-from .warming import warm_up as warm_up
+from .warm_up import warm_up as warm_up

@@ -9,9 +9,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..model.duty import HoldingBrake
 from ..model.gearbox import Gearbox
 from ..model.motor import Motor
+from ..model.process_loads import HoldingBrake
 from ..model.rack_and_belt import RatedBelt, RatedRack
 from ..model.screw import RatedScrew
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
@@ -19,8 +19,8 @@ from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, tooth_shares, wid
 from .catalogue_formulas import belt_force, buckling_force, compression_force, critical_speed, dn_speed, tooth_forces
 from .finding import Finding, Judgement, within
 from .life import HOUR, AxialLoad, axial_load, life_of_gearbox, screw_life
+from .linear_stage_demands import Stage
 from .required_motion import InputDemand, RequiredMotion
-from .stages import Stage
 
 BRAKE = "torque that the holding brake carries"
 SLIDE_BRAKE = "force that the brake of the slide carries"

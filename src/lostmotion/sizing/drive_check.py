@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..model.losses import LossMap
 from ..model.screw import RatedScrew
 from ..model.shaft_ratio import turns
@@ -23,7 +23,7 @@ from .gearbox_check import input_speeds, loads, locks, loss_map
 from .life import HOUR, AxialLoad, screw_life
 from .motion_check import end_stop, resonances
 from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
-from .motor_run import oriented_amplitudes
+from .motor_quantities import oriented_amplitudes
 from .power_off import holdings
 from .rules_of_one_axis import axis_rules
 from .stepper_check import speed_of_stepper, stepper_rules

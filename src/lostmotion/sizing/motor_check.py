@@ -13,7 +13,7 @@ from ..units.practical import ROUNDING, RPM, told_apart
 from .catalogue_formulas import WARM
 from .duty_cycle import DutyCycle
 from .finding import Finding, Judgement, within
-from .thermal import TwoBodies, mean_square, steady_rise
+from .winding_temperature import TwoBodies, mean_square, steady_rise
 
 WHOLE = ", that heats as the whole current"
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from ..control.command import CommandSignal, Stepping
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.named_elements import Named
 from ..inputs.refusal_messages import chosen_motor, shown
 from ..model.motor import ShaftMotor

@@ -7,10 +7,10 @@ from typing import Any
 import numpy as np
 
 from ..control.references import PositionReference
-from ..model.duty import Duty
 from ..model.gearbox import Gearbox
 from ..model.losses import ConstantEfficiency
 from ..model.motor import Motor
+from ..model.process_loads import Duty
 from ..model.signals import TimeFunction
 from ..simulation.forms.drive_tables import LoadTable
 from .duty_cycle import DutyCycle

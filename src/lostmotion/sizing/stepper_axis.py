@@ -9,7 +9,7 @@ import numpy as np
 
 from ..control.references import MovesReference
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Number
 from ..inputs.refusal_messages import chosen_motor
 from ..model.shaft_ratio import turns

@@ -8,8 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..model.duty import Amplifier, Bus
 from ..model.motor import Motor
+from ..model.process_loads import Amplifier, Bus
 from ..model.task import Task
 from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
@@ -18,7 +18,7 @@ from .catalogue_formulas import bus_voltage, capacitor_energy
 from .duty_cycle import integral, stretches
 from .finding import Finding, within
 from .motor_check import amperes_of, current_voltage_power
-from .motor_run import phase_amplitudes
+from .motor_quantities import phase_amplitudes
 from .required_motion import InputDemand
 
 

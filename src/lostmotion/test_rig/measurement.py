@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import numpy as np
 
 from ..data_sheets.gearbox_sheet import GearboxSheet
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..model.gear import Gear
 from ..model.gearbox import Gearbox
 from ..model.self_locking import Overrunning, overrunning

@@ -9,7 +9,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from ..data_sheets.linear_sheets import ScrewSheet
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Force
 from ..model.screw import ScrewData
 from ..units.practical import RPM

@@ -14,8 +14,8 @@ import numpy as np
 
 from ..control.command import CommandSignal
 from ..errors import InputError
-from ..inputs.arguments import checked
-from ..inputs.limits import check_free
+from ..inputs.argument_checks import checked
+from ..inputs.memory_limits import check_free
 from ..inputs.quantities import Count, Number, Speed, Torque
 from ..inputs.refusal_messages import shown
 from ..model.drive import Drive

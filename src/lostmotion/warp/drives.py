@@ -10,13 +10,13 @@ import numpy as np
 from .. import _core
 from ..control.axis import OPEN_LOOP
 from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count, Time
 from ..inputs.refusal_messages import listed, shown
 from ..model.drive import Drive
 from ..model.train import DriveTrain
 from ..simulation.batches.batch_parameters import mask_of_drives, numbers_of_drives, varied_columns
-from ..simulation.forms.dotted_keys import renamed
+from ..simulation.forms.set_by_dotted_key import renamed
 from ..simulation.scenario.one_gear import drive_keys
 from ..simulation.scenario.scenario import Scenario
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError, need
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count
 from ..inputs.refusal_messages import listed, shown
 from ..mujoco.attaching import alone_on_joint

@@ -18,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from ...errors import InputError, prefixed
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...verdict import Point as Answer
 from ...verdict import State, Verdict
 from ..candidate_models import grown, is_rough

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError, visible
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.refusal_messages import listed
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import find_scenario, load

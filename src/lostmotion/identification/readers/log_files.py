@@ -7,8 +7,8 @@ from dataclasses import replace
 from pathlib import Path
 
 from ...errors import InputError, prefixed
-from ...inputs.arguments import checked
-from ...inputs.limits import check_memory
+from ...inputs.argument_checks import checked
+from ...inputs.memory_limits import check_memory
 from .log import Log
 from .matlab_and_hdf5_logs import read_hdf5_log, read_mat_log
 from .mdf_logs import read_mdf_log

@@ -12,7 +12,7 @@ import numpy as np
 
 from ...errors import need
 from ...inputs.hdf5_files import datasets
-from ...inputs.limits import check_memory, memory_limit
+from ...inputs.memory_limits import check_memory, memory_limit
 from .log import Log, as_number, as_refusal
 from .named_arrays import log_of_variables
 

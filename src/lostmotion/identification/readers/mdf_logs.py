@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ...errors import InputError, need
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from .channel_conversions import conversion_of
 from .log import Channel, Log, quiet_ends, reason, warnings_of
 

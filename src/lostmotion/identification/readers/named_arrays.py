@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from ...inputs.refusal_messages import did_you_mean, listed
 from .log import Channel, Log, as_number
 from .log_tables import TIME_NAMES

@@ -8,7 +8,7 @@ from typing import IO, Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from ...inputs.zip_files import members
 from .log import Log, as_refusal
 from .named_arrays import log_of_variables

@@ -4,7 +4,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import need
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from .log import Log, as_number, as_refusal
 from .named_arrays import log_of_variables
 

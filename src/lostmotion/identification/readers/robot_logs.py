@@ -12,7 +12,7 @@ from typing import Any, BinaryIO
 import numpy as np
 
 from ...errors import InputError, need
-from ...inputs.limits import check_memory, memory_limit
+from ...inputs.memory_limits import check_memory, memory_limit
 from ...inputs.refusal_messages import listed
 from .log import Channel, Log, as_number, as_refusal, reason
 

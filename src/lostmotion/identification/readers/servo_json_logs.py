@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from .irregular_tables import LEAST, LOST
 from .log import Channel, Log, as_number, reason
 from .log_tables import TIME_NAMES, named_columns, seconds_of

@@ -10,7 +10,7 @@ from typing import IO, Any
 from xml.parsers import expat
 
 from ...errors import InputError, need
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from ...inputs.refusal_messages import listed
 from ...inputs.zip_files import members
 from .irregular_tables import odd_table_log

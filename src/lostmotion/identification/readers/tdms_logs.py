@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import need
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from .log import Log, as_refusal, warnings_of
 from .log_tables import TIME_NAMES
 from .named_arrays import log_of_variables

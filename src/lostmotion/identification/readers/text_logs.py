@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...inputs.limits import check_memory
+from ...inputs.memory_limits import check_memory
 from .irregular_tables import odd_table_log
 from .log import Log, reason
 from .log_tables import TableRow, UnreadError, plain_number, split_at_spaces, table_log

@@ -10,7 +10,7 @@ from typing import Any
 from ... import _core
 from ...errors import InputError
 from ...inputs.refusal_messages import did_you_mean
-from ...simulation.forms.dotted_keys import set_values
+from ...simulation.forms.set_by_dotted_key import set_values
 from ...simulation.forms.slide_units import of_slides
 from ...simulation.forms.train_tables import TrainInitial
 from ...simulation.runs.sensitivities import channels_of

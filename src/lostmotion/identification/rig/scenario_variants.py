@@ -11,7 +11,7 @@ from ...inputs.cached_values import keep
 from ...inputs.named_elements import Named
 from ...model.shaft import Shaft
 from ...model.train import DriveTrain
-from ...simulation.forms.dotted_keys import set_values
+from ...simulation.forms.set_by_dotted_key import set_values
 from ...simulation.forms.train_tables import TrainTables
 from ...simulation.scenario.scenario import Scenario
 

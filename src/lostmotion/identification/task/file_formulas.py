@@ -7,7 +7,7 @@ from functools import cache
 from typing import Any
 
 from ...errors import InputError
-from ...inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
+from ...inputs.expression_trees import ARITHMETIC, COMPARISONS, syntax_tree
 from ...inputs.refusal_messages import MAX_LISTED, did_you_mean, shortened, shown
 
 Functions = Mapping[str, Callable[..., Any]]

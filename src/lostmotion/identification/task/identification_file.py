@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import Field, model_validator
 
 from ...errors import prefixed
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.named_elements import Elements, nothing
 from ...inputs.part import Part
 from ...inputs.quantities import NotNegative, Number, Positive, Switch, Time, Whole

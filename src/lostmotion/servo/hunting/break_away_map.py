@@ -14,7 +14,7 @@ from functools import cached_property
 
 import numpy as np
 
-from .stuck_contact import StickSlip
+from .continuous_stuck_contact import StickSlip
 
 CURVED = 4e-4  # of what its modes are at an instant, by which a chord may depart from a function between two instants
 AFTER = 1.1  # times the end of the middle slip, within which all slips should end

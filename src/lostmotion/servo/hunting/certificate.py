@@ -10,19 +10,19 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import argument
 from ...inputs.refusal_messages import shown
 from ...simulation.scenario.scenario import Scenario
 from ..linear_regimes import Axis, axis_of
 from .break_away_map import Image, Transients, image
+from .continuous_proof import Certainty, Proof, prove
+from .continuous_stuck_contact import AtRestError, StickSlip, UndecidableError, stick_slip
 from .hunting_decision import moving_input
 from .limit_cycle_causes import at_rest
 from .limit_cycles import SAMPLES, UndrivenLoop
-from .proof import Certainty, Proof, prove
 from .sampled_proof import map_without_steps, prove_sampled, reached_by_run
 from .sampled_stuck_contact import SampledSlip, sampled_slip
-from .stuck_contact import AtRestError, StickSlip, UndecidableError, stick_slip
 
 if TYPE_CHECKING:
     import xarray

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ...errors import InputError
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import Count
 from ...inputs.refusal_messages import shown
 from ...interruptible_threads import thread_pool

@@ -8,9 +8,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from .continuous_stuck_contact import UndecidableError
 from .sampled_stuck_contact import SampledSlip
 from .state_boxes import Boxes, bend_of, need_within_limits
-from .stuck_contact import UndecidableError
 
 LONGEST = 3000  # ticks of a slip
 SETTLING = 600  # ticks of a stuck interval that are looked at

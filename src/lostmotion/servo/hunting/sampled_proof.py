@@ -17,12 +17,12 @@ import numpy as np
 from ...model.shaft_ratio import turns
 from ...units.practical import counted
 from ..linear_regimes import Axis
+from .continuous_proof import MARGIN, WIDER, Proof
+from .continuous_stuck_contact import UndecidableError
 from .hunting_decision import WatchedRun
-from .proof import MARGIN, WIDER, Proof
 from .quantised_slip_end import finish, loudest
 from .sampled_stuck_contact import SampledSlip, never_rests
 from .state_boxes import BoxFollower, starts
-from .stuck_contact import UndecidableError
 
 CELLS, PARTS = 4, 2  # of the angle within a step, and of the torque within the ramp of a sample
 ROUNDING = 1e-9  # of an encoder step

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
+from .continuous_stuck_contact import UndecidableError
 from .sampled_stuck_contact import SampledSlip
-from .stuck_contact import UndecidableError
 
 UNKNOWNS = (
     3  # of a start: error, angle within the encoder step, torque within the ramp of a sample; others are added by stops

@@ -11,8 +11,8 @@ import numpy as np
 
 from ...control.controller import Controller
 from ...errors import InputError
-from ...inputs.arguments import checked
-from ...inputs.limits import check_free
+from ...inputs.argument_checks import checked
+from ...inputs.memory_limits import check_free
 from ...inputs.quantities import Count, Time
 from ...inputs.refusal_messages import did_you_mean, listed, shown
 from ...model.drive import Drive

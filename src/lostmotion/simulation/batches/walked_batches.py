@@ -13,7 +13,7 @@ from ... import _core
 from ...errors import InputError
 from ...inputs.refusal_messages import did_you_mean
 from ...model.torsion import Rigid, TorsionCurve
-from ..forms.dotted_keys import renamed
+from ..forms.set_by_dotted_key import renamed
 from ..runs.sensitivities import SUFFIX
 from ..scenario.one_gear import drive_keys
 from ..scenario.scenario import Scenario

@@ -4,7 +4,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from .dotted_keys import renamed
+from .set_by_dotted_key import renamed
 
 MOTOR, LOAD, GEARBOX, SLIDE, BRAKE = "motor", "load", "gearbox", "slide", "brake"  # names in the long form
 DRIVES = {"screw": "screws", "rack": "racks", "belt": "belts"}

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ...errors import InputError
-from ...inputs.arguments import ScenarioName, checked
+from ...inputs.argument_checks import ScenarioName, checked
 from ..scenario import scenario_files
 from ..scenario.scenario import Scenario
 from ..scenario.scenario_files import changed, override

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...reproducible import sin
 from ..scenario.scenario import Scenario
 from ..variables_of_trains import angle_of_run

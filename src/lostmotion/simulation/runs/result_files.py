@@ -13,9 +13,9 @@ import numpy as np
 
 from ...atomic_writer import write_whole
 from ...errors import InputError, need, prefixed
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.hdf5_files import datasets
-from ...inputs.limits import RESULT, check_memory, read_text
+from ...inputs.memory_limits import RESULT, check_memory, read_text
 from ...inputs.toml_files import in_short
 from .results import labelled, recorded_variables, whole
 from .switchings import ATTRIBUTE as SWITCHINGS

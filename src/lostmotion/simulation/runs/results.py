@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import InputError
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.cached_values import kept
 from ...version import __version__
 from ..scenario.field_oriented_motors import set_torques

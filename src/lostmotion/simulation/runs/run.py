@@ -11,8 +11,8 @@ from ...control.axis import BoundController
 from ...control.command import CommandSignal
 from ...control.custom_controller import as_laws
 from ...errors import InputError
-from ...inputs.arguments import checked
-from ...inputs.limits import check_free
+from ...inputs.argument_checks import checked
+from ...inputs.memory_limits import check_free
 from ...inputs.quantities import Number
 from ...interruptible_threads import thread_pool
 from ...model.drive import Drive

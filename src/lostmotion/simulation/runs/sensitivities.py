@@ -18,7 +18,7 @@ from ...control.axis import BoundController
 from ...errors import InputError
 from ...inputs.implausible_values import trusted
 from ...inputs.refusal_messages import shortened, shown
-from ..forms.dotted_keys import list_index
+from ..forms.set_by_dotted_key import list_index
 from ..scenario.key_suggestions import near_key
 from ..scenario.requirements import need_free_motion
 from ..scenario.scenario import Scenario

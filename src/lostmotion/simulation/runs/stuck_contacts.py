@@ -12,7 +12,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import InputError
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import Time
 from ...model.end_stops import END_STOP
 from ...model.self_locking import SelfLocking, self_locking

@@ -10,7 +10,7 @@ import numpy as np
 
 from ... import _core
 from ...errors import InputError
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 
 if TYPE_CHECKING:
     import xarray

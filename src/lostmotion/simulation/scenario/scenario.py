@@ -33,10 +33,10 @@ from ...model.train import DriveTrain
 from ...recorded_numbers import may_differ
 from ..forms import axis_form, drive_form, stepper_fields
 from ..forms.common_tables import SimulationTable
-from ..forms.dotted_keys import set_values
 from ..forms.drive_tables import DriveTables, Initial, LoadTable
 from ..forms.initial_state import angles_at_start, given_speeds, start_values
 from ..forms.key_aliases import AXIS, DRIVE, TRAIN, TRAIN_OF_DRIVE, Form
+from ..forms.set_by_dotted_key import set_values
 from ..forms.train_checks import check_train
 from ..forms.train_tables import LINEAR_INITIAL, ShaftTable, TrainInitial, TrainTables, core_train
 from ..variables import Variable, variables_of_core

@@ -20,8 +20,8 @@ from ...model.gearbox import Gearbox
 from ...model.notes import Noted, Notes
 from ...model.screw import RatedScrew, ScrewData
 from ..forms.axis_form import file_schema
-from ..forms.dotted_keys import parse_override, set_values
 from ..forms.key_aliases import in_file
+from ..forms.set_by_dotted_key import parse_override, set_values
 from .scenario import Scenario
 from .shipped_scenarios import shipped_scenarios
 from .signal_files import read_series

@@ -14,8 +14,8 @@ from tomlkit.items import InlineTable
 from ...atomic_writer import write_whole
 from ...errors import InputError
 from ...inputs.toml_files import RESULTS, is_in_file
-from ..forms.dotted_keys import list_index
 from ..forms.key_aliases import in_file
+from ..forms.set_by_dotted_key import list_index
 from .scenario import Scenario
 from .scenario_files import find_base, find_scenario, scenario_text
 from .scenario_files import load as load_file

@@ -5,7 +5,7 @@ from __future__ import annotations
 from importlib.resources import files
 from pathlib import Path
 
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 
 
 @checked

@@ -7,7 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from ...errors import InputError
-from ...inputs.limits import read_text
+from ...inputs.memory_limits import read_text
 from ...inputs.refusal_messages import shown
 from ...units.conversion import to_si
 from ...units.grammar import UnknownUnitError, plain, read_unit

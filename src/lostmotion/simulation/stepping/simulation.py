@@ -15,7 +15,7 @@ from ...control.continuous import ContinuousController
 from ...control.controller import Controller
 from ...control.custom_controller import as_laws
 from ...errors import InputError
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import Time, argument
 from ...inputs.refusal_messages import did_you_mean, shown
 from ...model.couplings import FULL_COMMAND

@@ -31,8 +31,8 @@ from ...inputs.quantities import (
 )
 from ...inputs.refusal_messages import unknown_key
 from ...model.angle_torques import STANDARD_GRAVITY
-from ...model.duty import Amplifier, Duty, HoldingBrake, Supply
 from ...model.motor import STEPPER_KEYS, Motor, MotorLimits
+from ...model.process_loads import Amplifier, Duty, HoldingBrake, Supply
 from ...model.signals import TimeFunction, TorqueSignal
 from ...model.task import Task
 from ...simulation.forms.drive_tables import LoadTable

@@ -13,9 +13,9 @@ from ...control.gain_rules import TwoInertias, suited
 from ...control.loops import Feedforward, FirstOrderCurrent, SampledCurrent
 from ...control.references import PositionReference
 from ...inputs.cached_values import kept
-from ...model.duty import Duty
 from ...model.gearbox import Gearbox
 from ...model.motor import Motor
+from ...model.process_loads import Duty
 from ...model.signals import Samples, TimeFunction, TorqueSignal
 from ...servo.tuning_data import lag_sum, secant
 from ...simulation.forms.common_tables import SimulationTable

@@ -14,7 +14,7 @@ from ...simulation.runs.results import RunArrays
 from ...simulation.scenario.scenario import Scenario
 from ..duty_cycle import DutyCycle, after_moves
 from ..motor_check import rms_rise
-from ..thermal import TwoBodies
+from ..winding_temperature import TwoBodies
 from .candidate_scenario import Cycles, last_cycle
 from .motor_per_sample_time import Electrical
 

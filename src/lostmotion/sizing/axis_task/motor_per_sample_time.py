@@ -12,8 +12,8 @@ from ...control.loops import FirstOrderCurrent, IdealCurrent
 from ...simulation.runs.results import RunArrays
 from ...simulation.scenario.scenario import Scenario
 from ..motor_check import command_of_run, current_voltage_power
-from ..motor_run import oriented_amplitudes
-from ..thermal import mean_square
+from ..motor_quantities import oriented_amplitudes
+from ..winding_temperature import mean_square
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from ...inputs.operators import ARITHMETIC, COMPARISONS, syntax_tree
+from ...inputs.expression_trees import ARITHMETIC, COMPARISONS, syntax_tree
 from ...inputs.refusal_messages import MAX_LISTED, listed, nearest, shortened
 from .functions import BANDWIDTH, FUNCTIONS, METHODS, REDUCTIONS, Function, FunctionParameter
 from .measures import Measure, measure, plain, power, product, text_of, total

@@ -39,9 +39,10 @@ from ...sizing.axis_task.mass_and_price import judged as judged_choice
 from ...sizing.catalogue_formulas import derating
 from ...sizing.finding import Finding
 from ...sizing.gearbox_check import input_speeds, loads, lost_motion
+from ...sizing.linear_stage_demands import Stage, at_input, together
 from ...sizing.motion_check import ratio_of_inertias
 from ...sizing.motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
-from ...sizing.motor_run import oriented_amplitudes
+from ...sizing.motor_quantities import oriented_amplitudes
 from ...sizing.required_motion import (
     InputDemand,
     RequiredMotion,
@@ -50,7 +51,6 @@ from ...sizing.required_motion import (
     input_demand,
     required_motion,
 )
-from ...sizing.stages import Stage, at_input, together
 from ...sizing.stepper_check import speed_of_stepper, stepper_rules
 from ...sizing.supply import amplifier_rules, effective_current, electrical_power, returned, supply_rules
 from ..study.drive_check_columns import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE, columns_of

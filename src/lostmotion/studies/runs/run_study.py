@@ -19,7 +19,7 @@ from typing import Any
 
 from ...atomic_writer import write_bytes
 from ...errors import InputError, need
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import Count
 from ..study.study_definition import Study
 from ..study.study_files import from_json, to_json

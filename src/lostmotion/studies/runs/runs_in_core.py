@@ -7,7 +7,7 @@ import numpy as np
 from ... import _core
 from ...errors import InputError
 from ...model.torsion import Rigid
-from ...simulation.forms.dotted_keys import renamed
+from ...simulation.forms.set_by_dotted_key import renamed
 from ...simulation.runs.core_runs import core_case
 from ...simulation.runs.pointing_error import pointed
 from ...simulation.runs.separate_trains import parts_of

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import Count
 from ...sizing.axis_task.cycle_demands import COLUMNS
 from ..runs.read_table import read_table, unit_of

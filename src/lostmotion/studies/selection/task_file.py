@@ -10,7 +10,7 @@ from ...control.controller import AnyCurrent
 from ...data_sheets.components import accessories_in, record_in, use_accessories
 from ...data_sheets.records import find
 from ...errors import InputError, inside
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.quantities import argument
 from ...inputs.refusal_messages import shown, unknown_key
 from ...inputs.schema import follow, unit_in_schema
@@ -26,7 +26,7 @@ from ...simulation.forms.train_tables import train_schema
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.scenario_files import read_series_files, units_of_series
 from ...sizing.axis_task.axis_task import AxisTask, InnerLoop, reference_of
-from ...sizing.stages import STAGES, stage_of
+from ...sizing.linear_stage_demands import STAGES, stage_of
 from ...sizing.whole_drives import BESIDE, LINEAR, WHOLE
 from ..study.records_that_vary import kind_of_record, names_that_fit
 from ..study.select_table import Selection

@@ -14,15 +14,15 @@ from ...errors import InputError
 from ...inputs.part import Part
 from ...inputs.quantities import Whole
 from ...inputs.refusal_messages import did_you_mean, listed
-from ...model.duty import HoldingBrake
 from ...model.motor import Motor
+from ...model.process_loads import HoldingBrake
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.units_of_keys import unit_in, unit_of_key
 from ...sizing.axis_task.axis_task import FEWEST, ONE_WAY, AxisTask, reference_of, turns_back
 from ...sizing.axis_task.candidate_scenario import axis_scenario, with_scale_alone
 from ...sizing.axis_task.cycle_demands import COLUMNS as AXIS_COLUMNS
 from ...sizing.axis_task.cycle_demands import unit_of_column
-from ...sizing.stages import stage_of, together
+from ...sizing.linear_stage_demands import stage_of, together
 from ...sizing.whole_drives import LINEAR, WHOLE, whole_drive
 from ..expressions.expressions import Expression, read_expression
 from ..expressions.vocabulary import Vocabulary, vocabulary_of

@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any, cast
 
 from ...errors import InputError, prefixed
-from ...inputs.arguments import checked
+from ...inputs.argument_checks import checked
 from ...inputs.toml_files import read_toml
 from ...simulation.forms.axis_form import long_form
 from ...simulation.runs.loading import load

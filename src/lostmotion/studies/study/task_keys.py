@@ -9,12 +9,12 @@ from ...inputs.refusal_messages import shown
 from ...inputs.schema import follow, unit_in_schema
 from ...model.linear_motor import LinearMotorData
 from ...model.motor import Motor
-from ...simulation.forms.dotted_keys import list_index
+from ...simulation.forms.set_by_dotted_key import list_index
 from ...simulation.forms.slide_units import OF_REFERENCE, of_slides
 from ...simulation.forms.train_tables import TrainTables
 from ...simulation.scenario.units_of_keys import in_si, unit_in, unit_of_key
 from ...sizing.axis_task.axis_task import AxisTask
-from ...sizing.stages import STAGES
+from ...sizing.linear_stage_demands import STAGES
 from ...sizing.whole_drives import WHOLE
 from .records_that_vary import kind_of_record
 from .vary import WAYS, Vary

@@ -18,7 +18,7 @@ from ...inputs.quantities import Switch
 from ...inputs.refusal_messages import shown
 from ...model.signals import Signal
 from ...reproducible import exp, log
-from ...simulation.forms.dotted_keys import list_index
+from ...simulation.forms.set_by_dotted_key import list_index
 from ...simulation.scenario.key_suggestions import near_key
 from ...simulation.scenario.scenario import Scenario
 from ...simulation.scenario.units_of_keys import in_si, unit_in, unit_of_key

@@ -13,7 +13,7 @@ from typing import Literal
 import numpy as np
 
 from .break_away_map import Image, Transients, image
-from .stuck_contact import StickSlip
+from .continuous_stuck_contact import StickSlip
 
 Certainty = Literal["hunts", "does not hunt", "not decided"]
 

@@ -21,7 +21,7 @@ from ..inputs.refusal_messages import did_you_mean, names_like
 from ..inputs.toml_files import is_in_file
 from ..units.conversion import si_value
 from ..units.practical import RPM
-from .sheet_rows import rows_of
+from .data_sheet_rows import rows_of
 
 SCREEN = 34  # records that fit on a screen with the lines around them
 QUANTITIES: dict[str, tuple[str, str, float, tuple[tuple[Any, tuple[str, ...]], ...]]] = {

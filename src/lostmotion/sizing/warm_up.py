@@ -1,6 +1,6 @@
 """Temperature as a slow parameter: a run in intervals, whose temperatures are frozen within each and follow its losses.
 
-Winding and housing are the two bodies of `thermal.TwoBodies`. An interval runs with the values of its first temperatures: the winding's
+Winding and housing are the two bodies of `winding_temperature.TwoBodies`. An interval runs with the values of its first temperatures: the winding's
 resistance, the torque constant, and all that goes with the viscosity of the lubricant. Then the bodies take the mean heat of that
 interval, from its energy ledger and the mean square of the torque, by the exact solution of their equations.
 """
@@ -19,7 +19,7 @@ from .. import _core
 from ..data_sheets.loss_data import Lubricant
 from ..data_sheets.loss_map_from_data_sheet import VISCOSITY_EXPONENT
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.implausible_values import trusted
 from ..inputs.quantities import Number, Temperature, Time
 from ..inputs.refusal_messages import chosen_motor, did_you_mean
@@ -32,8 +32,8 @@ from ..simulation.runs.core_runs import core_case
 from ..simulation.runs.results import raw_result
 from ..simulation.runs.run import MAX_SWITCHINGS, check_memory
 from ..simulation.scenario.scenario import Scenario
-from .thermal import COPPER, TwoBodies, need_two_bodies
 from .torque_squares import squares
+from .winding_temperature import COPPER, TwoBodies, need_two_bodies
 
 if TYPE_CHECKING:
     import xarray

@@ -6,7 +6,7 @@ import numpy as np
 
 from ..sizing.stepper_axis import OpenLoop
 from ..units.practical import charted, practical
-from .looks import FAINT, look
+from .figure_style import FAINT, look
 from .page import Prose, Report, Table
 from .panels import Curve, Group, Panel
 

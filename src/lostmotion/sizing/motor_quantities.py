@@ -8,15 +8,15 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.quantities import Temperature
 from ..inputs.refusal_messages import chosen_motor
 from ..model.motor import ShaftMotor
 from ..simulation.runs.results import RunArrays, scenario_of
 from ..simulation.scenario.scenario import Scenario
 from .motor_check import amperes_of, command_of_run, current_voltage_power
-from .thermal import COPPER, mean_square, need_two_bodies, rms
 from .torque_squares import squares_of
+from .winding_temperature import COPPER, mean_square, need_two_bodies, rms
 
 if TYPE_CHECKING:
     import xarray

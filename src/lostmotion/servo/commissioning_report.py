@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 
 from ..errors import InputError
-from ..inputs.arguments import checked
+from ..inputs.argument_checks import checked
 from ..inputs.implausible_values import doubt_window
 from ..inputs.refusal_messages import shown
 from ..simulation.scenario.scenario import Scenario

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from matplotlib.colors import LinearSegmentedColormap
 
-from .looks import COLOURS, INK, PALETTE, SMALLEST
+from .figure_style import COLOURS, INK, PALETTE, SMALLEST
 from .panels import Bars, Chart, Contacts, Flows, Histogram, Matrix
 
 FIRST, SECOND = PALETTE["first"], PALETTE["second"]
