@@ -10,8 +10,8 @@ import numpy as np
 
 from ..model.losses import LossMap
 from ..reports.figure_style import FAINT, LEVEL, STYLES, step
-from ..reports.written_files import panels_csv, table_csv
 from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
+from ..reports.written_files import panels_csv, table_csv
 from ..response.crossovers import THREE_DECIBELS
 from ..response.rigid import rigid_constants
 from .published_drive import AMPLITUDES, MODELS, paper_scenario

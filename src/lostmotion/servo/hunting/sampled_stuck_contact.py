@@ -22,8 +22,8 @@ from ...model.shaft_ratio import turns
 from ...response.linearisation import LinearModel
 from ...simulation.forms.train_tables import TrainInitial
 from ..linear_regimes import Axis
-from .hunting_decision import FOREVER
 from .continuous_stuck_contact import NONE, AtRestError, UndecidableError, only_contact, others, slow_regimes
+from .hunting_decision import FOREVER
 
 ROUNDING = 1e-15  # of a number of encoder steps, by which its computation may change it
 DOUBLINGS = 40  # of the time until what is not the ramp of the integrator has settled
