@@ -1,9 +1,11 @@
-"""How a test looks at an error: one line, in plain words."""
+"""How a test looks at an error: one line, in plain words, with keys and reasons as data."""
 
+import inspect
 import re
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -42,3 +44,28 @@ def refuses(*keys: str, match: str = "") -> Iterator[list[str]]:
     assert "\n" not in told[0]
     assert not keys or [problem.keys for problem in caught.value.problems if problem.keys] == [keys], told[0]
     assert re.search(match, told[0]), f"{told[0]} lacks {match}"
+
+
+def refusals_of(make: Callable[..., object], *cases: tuple[Any, ...]) -> Callable[..., None]:
+    """A test that `make` refuses the arguments of each case, whose last entry says by which data, as `keys: reason`.
+
+    The keys are all those of one problem of the error, and the reason is part of its reason; either may be left out. A keyword
+    of `make` is a fixture.
+    """
+
+    @pytest.mark.parametrize("case", cases, ids=[case[-1][:60] for case in cases])
+    def test(case: tuple[Any, ...], request: pytest.FixtureRequest) -> None:
+        fixtures = {name: request.getfixturevalue(name) for name in inspect.getfullargspec(make).kwonlyargs}
+        keys, _, reason = case[-1].partition(": ")
+        with pytest.raises(lm.InputError) as caught:
+            make(*case[:-1], **fixtures)
+        problems = caught.value.problems
+        assert any(keys in ("", ", ".join(p.keys)) and reason in p.reason for p in problems), f"{case[-1]}: not in {problems}"
+        assert "\n" not in str(caught.value)
+
+    return test
+
+
+def refusals(*cases: tuple[Callable[[], object], str]) -> Callable[..., None]:
+    """A test that each call is refused by the data that follow it, as in `refusals_of`."""
+    return refusals_of(lambda call: call(), *cases)

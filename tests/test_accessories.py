@@ -19,7 +19,7 @@ from lostmotion.studies.selection.nearest_misses import not_judged
 from lostmotion.studies.selection.ranking import RankedCandidate
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study_definition import Study
-from refusals import refused
+from refusals import refusals_of
 
 ARM: dict[str, Any] = {
     "task": {"cycle": "2 s", "gravity": {"mass": 2.0, "radius": 0.2}, "hold_without_power": False},
@@ -239,14 +239,10 @@ def test_records_that_cannot_be_judged_are_grouped_by_what_they_lack():
     assert len(group.candidates) == 3
 
 
-@pytest.mark.parametrize(
-    ("changes", "says"),
-    [
-        ({"brake": "yaskawa-sgm7a-15a"}, "is a motor; a brake is wanted here"),
-        ({"amplifier": "tgz"}, 'amplifier "tgz" is not in the catalogue'),
-        ({"amplifier": {"continuous_current": 5.0, "peak_current": 3.0}}, "exchange them"),
-        ({"amplifier": {"continuous_current": 5.0}, "supply": {"continuous_current": 4.0}}, "says the same"),
-    ],
+test_wrong_accessories_are_refused = refusals_of(
+    lambda changes: task_of({**task(**changes), **JOINT}),
+    ({"brake": "yaskawa-sgm7a-15a"}, ": is a motor; a brake is wanted here"),
+    ({"amplifier": "tgz"}, ': amplifier "tgz" is not in the catalogue'),
+    ({"amplifier": {"continuous_current": 5.0, "peak_current": 3.0}}, "task.amplifier: exchange them"),
+    ({"amplifier": {"continuous_current": 5.0}, "supply": {"continuous_current": 4.0}}, "task.supply.continuous_current: says the same"),
 )
-def test_wrong_accessories_are_refused_in_one_line(changes: dict[str, Any], says: str):
-    refused(lambda: task_of({**task(**changes), **JOINT}), match=says)

@@ -9,7 +9,7 @@ import pytest
 import lostmotion as lm
 from lostmotion import _core
 from lostmotion.simulation.batches.walked_batches import WalkedBatch
-from refusals import refused
+from refusals import refusals_of, refused
 
 STEP = 1e-3
 
@@ -371,42 +371,46 @@ def two(drive: Any, **options: Any) -> lm.SimulationBatch:
 
 
 REFUSED: list[tuple[Callable[[lm.Drive], Any], str]] = [
-    (lambda d: lm.SimulationBatch(d, STEP), "count: give the number of drives"),
-    (lambda d: lm.SimulationBatch([], STEP), "drives: there is none"),
-    (lambda d: lm.SimulationBatch(d, 0.0, count=2), "step 0.0 s must lie between"),
-    (lambda d: lm.SimulationBatch([d, d], STEP, count=2), "are for one drive"),
-    (lambda d: lm.SimulationBatch([lm.load("worm-lowering"), lm.load("speed-axis")], STEP), "different inputs"),
-    (lambda d: two(d, vary={"load.inertia": [1, 2, 3]}), "3 values for 2 drives"),
-    (lambda d: two(d, vary={"load.inertja": np.ones(2)}), "load.inertia"),
-    (lambda d: two(d, vary={"load.inertia": np.array([1.0, -1.0])}), "inertia"),
-    (lambda d: two(d, vary={"motor.rated_speed": np.ones(2)}), "motor.rated_speed: the scenario has nothing of that name"),
-    (lambda d: two(d).step([1.0, 2.0, 3.0]), "command: .* an array of 2 numbers"),
-    (lambda d: two(d).step([1.0, np.nan]), "command: has numbers that are not"),
-    (lambda d: two(d).step(0.1, motion={"speed": 1.0}), "motion: is for a batch"),
-    (lambda d: two(d)["angle"], "is no variable of a batch"),
-    (lambda d: two(d).reset([1, 0]), "array of 2 Booleans"),
-    (lambda d: two(d).reset(initial={"angle": 1.0}), "initial.angle: is no state"),
-    (lambda d: two("given-motion"), "gives the motion of a shaft"),
-    (lambda d: two("worm-lowering", given_motion="lod"), "is no shaft or slide"),
-    (lambda d: two("two-motors-one-ring").step(0.1), "command: there are several"),
-    (lambda d: two("two-motors-one-ring").step(first_motor_command=0.1), "second_motor_command: missing"),
-    (lambda d: two("two-motors-one-ring", controllers=lm.load("speed-axis").controller), "one motor"),
-    (lambda d: two("paper-2dof-nl-small", sensitivities=["gearbox.stiffness.backlash"]), "is 0 for drive 0"),
-    (lambda d: two("paper-2dof-nl-small", sensitivities=["simulation.duration"]), "no number that a batch differentiates by"),
-    (lambda d: two("paper-2dof-nl-small", sensitivities=["load.inertias"]), "did you mean load.inertia"),
-    (lambda d: two("position-axis", sensitivities=["load.inertia"]), "a controller turns the motor"),
-    (lambda d: two("two-motors-one-ring", sensitivities=["shafts.ring.inertia"]), "lm.simulate takes all trains"),
-    (lambda d: two(d, controllers="position"), "must be a Controller, or a list"),
-    (lambda d: two(d, controllers=[lm.load("position-axis").controller]), "controllers: there are 1 for 2 drives"),
-    (lambda d: two(d, controllers=[1, 2]), "controllers: 1 must be a Controller"),
-    (lambda d: two(d, controllers=lm.load("speed-axis", LAW).controller), "a law of your own is for"),
+    (lambda d: lm.SimulationBatch(d, STEP), ": count: give the number of drives"),
+    (lambda d: lm.SimulationBatch([], STEP), ": drives: there is none"),
+    (lambda d: lm.SimulationBatch(d, 0.0, count=2), ": step 0.0 s must lie between"),
+    (lambda d: lm.SimulationBatch([d, d], STEP, count=2), ": are for one drive"),
+    (lambda d: lm.SimulationBatch([lm.load("worm-lowering"), lm.load("speed-axis")], STEP), ": different inputs"),
+    (lambda d: two(d, vary={"load.inertia": [1, 2, 3]}), ": 3 values for 2 drives"),
+    (lambda d: two(d, vary={"load.inertja": np.ones(2)}), ": did you mean load.inertia"),
+    (lambda d: two(d, vary={"load.inertia": np.array([1.0, -1.0])}), "load.inertia"),
+    (lambda d: two(d, vary={"motor.rated_speed": np.ones(2)}), ": motor.rated_speed: the scenario has nothing of that name"),
+    (lambda d: two(d).step([1.0, 2.0, 3.0]), ": an array of 2 numbers"),
+    (lambda d: two(d).step([1.0, np.nan]), ": command: has numbers that are not"),
+    (lambda d: two(d).step(0.1, motion={"speed": 1.0}), ": motion: is for a batch"),
+    (lambda d: two(d)["angle"], ": is no variable of a batch"),
+    (lambda d: two(d).reset([1, 0]), ": array of 2 Booleans"),
+    (lambda d: two(d).reset(initial={"angle": 1.0}), ": initial.angle: is no state"),
+    (lambda d: two("given-motion"), ": gives the motion of a shaft"),
+    (lambda d: two("worm-lowering", given_motion="lod"), ": is no shaft or slide"),
+    (lambda d: two("two-motors-one-ring").step(0.1), ": command: there are several"),
+    (lambda d: two("two-motors-one-ring").step(first_motor_command=0.1), ": second_motor_command: missing"),
+    (lambda d: two("two-motors-one-ring", controllers=lm.load("speed-axis").controller), ": one motor"),
+    (
+        lambda d: two("paper-2dof-nl-small", sensitivities=["gearbox.stiffness.backlash"]),
+        "sensitivities.gearbox.stiffness.backlash: is 0 for drive 0",
+    ),
+    (
+        lambda d: two("paper-2dof-nl-small", sensitivities=["simulation.duration"]),
+        "sensitivities.simulation.duration: no number that a batch differentiates by",
+    ),
+    (lambda d: two("paper-2dof-nl-small", sensitivities=["load.inertias"]), ": did you mean load.inertia"),
+    (lambda d: two("position-axis", sensitivities=["load.inertia"]), ": a controller turns the motor"),
+    (lambda d: two("two-motors-one-ring", sensitivities=["shafts.ring.inertia"]), ": lm.simulate takes all trains"),
+    (lambda d: two(d, controllers="position"), ": must be a Controller, or a list"),
+    (lambda d: two(d, controllers=[lm.load("position-axis").controller]), ": controllers: there are 1 for 2 drives"),
+    (lambda d: two(d, controllers=[1, 2]), ": controllers: 1 must be a Controller"),
+    (lambda d: two(d, controllers=lm.load("speed-axis", LAW).controller), ": a law of your own is for"),
 ]
 LAW = {"controller.law": True, "controller.speed": None}
 
 
-@pytest.mark.parametrize(("use", "message"), REFUSED, ids=[message for _, message in REFUSED])
-def test_bad_use_ends_in_one_clear_line(use: Callable[[lm.Drive], Any], message: str) -> None:
-    assert len(refused(lambda: use(simple_drive()), match=message)) <= 200
+test_bad_use_is_refused = refusals_of(lambda use: use(simple_drive()), *REFUSED)
 
 
 def test_what_is_no_parameter_is_refused_and_nothing_moves() -> None:

@@ -11,7 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.key_aliases import DRIVE
-from refusals import refused
+from refusals import refusals_of, refused
 
 MOVES = {"moves": [{"to": "90 deg"}], "speed": "3 rad/s", "acceleration": "20 rad/s^2", "jerk": "800 rad/s^3"}
 FLANKS = {"kind": "rigid", "backlash": "2 mrad", "restitution": 0.4}
@@ -101,20 +101,16 @@ def test_the_drive_torque_of_a_given_load_by_hand() -> None:
     assert float(result["load_angle"][-1]) == pytest.approx(0.5 * math.pi, rel=1e-13)
 
 
-@pytest.mark.parametrize(
-    ("tables", "message"),
-    [
-        (short({"speed": 1.0, "motion": MOVES}), "keys load.speed, load.motion: both give the motion"),
-        (short({"speed": "1 m/s"}), "key load.speed"),
-        (short({"motion": {"moves": [{"to": "1 m"}], "speed": 1.0, "acceleration": 1.0}}), "key load.motion.moves[0].to"),
-        (short({"speed": 1.0}) | {"initial": {"load_speed": 1.0}}, "keys load.speed, initial.load_speed: both say"),
-        (short({"motion": MOVES}, stiffness=FLANKS), "key gearbox: has rigid flanks, and the motion of shaft 'load' is given"),
-        (short(stiffness={"kind": "rigid", "backlash": "2 mrad"}), "key gearbox.stiffness: has rigid flanks with backlash"),
-        (short({"sped": 1.0}, stiffness=FLANKS), "key load.sped"),
-    ],
+test_bad_input_is_refused_with_the_keys_of_the_short_form = refusals_of(
+    lm.Scenario.model_validate,
+    (short({"speed": 1.0, "motion": MOVES}), "load.speed, load.motion: both give the motion"),
+    (short({"speed": "1 m/s"}), "load.speed.mean"),
+    (short({"motion": {"moves": [{"to": "1 m"}], "speed": 1.0, "acceleration": 1.0}}), "load.motion.moves[0].to"),
+    (short({"speed": 1.0}) | {"initial": {"load_speed": 1.0}}, "load.speed, initial.load_speed: both say"),
+    (short({"motion": MOVES}, stiffness=FLANKS), "gearbox: has rigid flanks, and the motion of shaft 'load' is given"),
+    (short(stiffness={"kind": "rigid", "backlash": "2 mrad"}), "gearbox.stiffness: has rigid flanks with backlash"),
+    (short({"sped": 1.0}, stiffness=FLANKS), "load.sped"),
 )  # fmt: skip
-def test_bad_input_is_refused_with_the_keys_of_the_short_form(tables: dict[str, Any], message: str) -> None:
-    assert message in refused(lambda: lm.Scenario.model_validate(tables))
 
 
 def test_a_rigid_gear_without_backlash_stays_in_the_short_form() -> None:

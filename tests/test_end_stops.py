@@ -13,7 +13,7 @@ from lostmotion.errors import InputError
 from lostmotion.reports.panels import Contacts
 from lostmotion.reports.run import summary
 from lostmotion.reports.run_charts import run_charts
-from refusals import refused
+from refusals import refusals_of, refused
 
 G = 9.80665
 
@@ -198,18 +198,14 @@ def test_a_motor_presses_with_what_its_ratio_makes_of_its_torque(kind: str) -> N
     assert "load_end_stop" in str(lm.explain(scenario, 30.0)) or kind != "rigid"
 
 
-@pytest.mark.parametrize(
-    ("stops", "key"),
-    [
-        ({"lower": 1.0, "upper": 1.0, "stiffness": 1e6}, "slides.ball.end_stops"),
-        ({}, "slides.ball.end_stops"),
-        ({"stiffness": 1e6, "restitution": 0.5}, "slides.ball.end_stops"),
-        ({"restitution": 0.5, "damping": 1.0}, "slides.ball.end_stops"),
-        ({"restitution": 1.5}, "slides.ball.end_stops.restitution"),
-    ],
+test_what_is_no_stop_is_refused = refusals_of(
+    ball,
+    ({"lower": 1.0, "upper": 1.0, "stiffness": 1e6}, "slides.ball.end_stops"),
+    ({}, "slides.ball.end_stops"),
+    ({"stiffness": 1e6, "restitution": 0.5}, "slides.ball.end_stops"),
+    ({"restitution": 0.5, "damping": 1.0}, "slides.ball.end_stops"),
+    ({"restitution": 1.5}, "slides.ball.end_stops.restitution"),
 )
-def test_what_is_no_stop_is_refused(stops: dict[str, Any], key: str) -> None:
-    refused(lambda: ball(stops), key)
 
 
 def test_a_run_begins_between_rigid_stops() -> None:

@@ -11,7 +11,7 @@ import lostmotion as lm
 from identification_logs import released, spring_task
 from lostmotion.identification.identify import identify_task
 from lostmotion.reports.identification import identification_report
-from refusals import refused
+from refusals import refusals_of
 
 TIME = np.arange(0.0, 2.0, 0.02)
 BEGIN = 0.01  # m
@@ -84,13 +84,9 @@ def test_the_error_of_a_condition_left_out_is_that_of_the_closed_form(folders: P
     assert 90.0 < result.values["mass"] < 125.0  # of the fit to all, which stays
 
 
-@pytest.mark.parametrize(
-    ("keys", "text"),
-    [
-        (["folders"], r"key fit.leave_out: heavy/a.csv has no 'folders' in its header; did you mean folder\?"),
-        (["zzz"], "give it with logs.header"),
-        (["kind"], "key fit.leave_out: 'kind' is 3.0 in all fitted logs; leave it out of the list"),
-    ],
+test_a_key_that_does_not_divide_the_logs_is_refused = refusals_of(
+    lambda keys, *, folders: run(folders, {"leave_out": keys}, header={"kind": 3.0}),
+    (["folders"], "fit.leave_out: heavy/a.csv has no 'folders' in its header; did you mean folder?"),
+    (["zzz"], "fit.leave_out: give it with logs.header"),
+    (["kind"], "fit.leave_out: 'kind' is 3.0 in all fitted logs; leave it out of the list"),
 )
-def test_a_key_that_does_not_divide_the_logs_is_refused(folders: Path, keys: list[str], text: str) -> None:
-    refused(lambda: run(folders, {"leave_out": keys}, header={"kind": 3.0}), match=text)

@@ -12,7 +12,7 @@ from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study_definition import Study
-from refusals import refused
+from refusals import refusals_of
 
 SCALE = {"grating_period": "20 um", "bits": 10}
 MOVES = {
@@ -173,15 +173,11 @@ def test_all_linear_motors_where_none_is_named():
     assert rules(beside)["motor_peak_torque"].use == pytest.approx(rules(task_of(TASK))["motor_peak_torque"].use + 2.0 / 187.0, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"controller": {"encoder": {"bits": 20}, "reference": MOVES}}, "position_encoder: a linear motor needs a scale"),
-        ({"linear_motor": {"mas": "1 kg"}}, "linear_motor.mas"),
-        ({"slide": {"mass": "5 kg", "friction_coefficient": -0.1}}, "friction_coefficient"),
-        ({"task": {"cycle": "1.5 s", "brake": {"force": "60 N", "inertia": 1.0}}}, "leave the inertia out"),
-        ({"task": {"cycle": "1.5 s", "brake": {"inertia": 1.0}}}, "needs torque, force of a brake"),
-    ],
+test_bad_tasks_of_linear_motors_are_refused = refusals_of(
+    lambda change: rules(task_of(TASK | change)),
+    ({"controller": {"encoder": {"bits": 20}, "reference": MOVES}}, "controller.position_encoder: a linear motor needs a scale"),
+    ({"linear_motor": {"mas": "1 kg"}}, "linear_motor.mas"),
+    ({"slide": {"mass": "5 kg", "friction_coefficient": -0.1}}, "slide.friction_coefficient"),
+    ({"task": {"cycle": "1.5 s", "brake": {"force": "60 N", "inertia": 1.0}}}, "task.brake: leave the inertia out"),
+    ({"task": {"cycle": "1.5 s", "brake": {"inertia": 1.0}}}, "task.brake: needs torque, force of a brake"),
 )  # fmt: skip
-def test_bad_tasks_of_linear_motors_are_refused(change: dict[str, Any], says: str):
-    refused(lambda: rules(task_of(TASK | change)), match=says)

@@ -9,7 +9,7 @@ from scipy.linalg import expm
 
 import lostmotion as lm
 from conftest import some
-from refusals import refused, refuses
+from refusals import refusals_of, refuses
 
 FIRST = {"k": 800.0, "c": 3.0}
 SECOND = {"k": 2000.0, "c": 0.5}
@@ -189,21 +189,16 @@ def test_step_by_step_and_as_a_whole_it_is_the_same() -> None:
         assert simulation[name] == pytest.approx(float(whole[name].values[-1]), rel=1e-11)
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"gears.first.mesh_damping": 0.0, "gears.second.mesh_damping": 0.0},
-         r"key shafts\.node: has no inertia, and no damping acts on it in all states of its gears; give it an inertia "
-         r"\(2e-06 kg\*m\^2 is harmless beside its neighbours\), or mesh damping"),
-        ({"gears.first.stiffness": GAP["stiffness"], "gears.second.stiffness": GAP["stiffness"]},
-         r"key shafts\.node: has no inertia, and no damping acts"),
-        ({"shafts.node.friction_torque": 0.1}, r"key shafts\.node: has no inertia, and node_contact is a dry contact at it"),
-        ({"gears.first.hysteresis": {"efficiency": 0.9}}, "has no inertia, and first_twist_contact is a dry contact"),
-        ({"initial.speeds": {"node": 1.0}}, r"key initial\.speeds\.node: node has no inertia, and its speed follows"),
-    ],
+test_what_has_no_unique_motion_is_refused_with_the_remedy = refusals_of(
+    lambda changes: chain().replace(**changes),
+    ({"gears.first.mesh_damping": 0.0, "gears.second.mesh_damping": 0.0},
+         "shafts.node: give it an inertia (2e-06 kg*m^2 is harmless beside its neighbours), or mesh damping"),
+    ({"gears.first.stiffness": GAP["stiffness"], "gears.second.stiffness": GAP["stiffness"]},
+         "shafts.node: has no inertia, and no damping acts"),
+    ({"shafts.node.friction_torque": 0.1}, "shafts.node: has no inertia, and node_contact is a dry contact at it"),
+    ({"gears.first.hysteresis": {"efficiency": 0.9}}, "shafts.node: has no inertia, and first_twist_contact is a dry contact"),
+    ({"initial.speeds": {"node": 1.0}}, "initial.speeds.node: node has no inertia, and its speed follows"),
 )  # fmt: skip
-def test_what_has_no_unique_motion_is_refused_with_the_remedy(changes: dict[str, Any], said: str) -> None:
-    refused(lambda: chain().replace(**changes), match=said)
 
 
 @pytest.mark.parametrize("seed", range(some(20, 8)))

@@ -11,7 +11,7 @@ import lostmotion as lm
 from lostmotion.data_sheets.components import motor_table
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.winding_temperature import COPPER, TwoBodies, mean_square
-from refusals import refused
+from refusals import refusals_of, refused
 
 THERMAL = {
     "thermal_resistance_winding_case": "0.8 K/W",
@@ -237,23 +237,19 @@ def test_synchronous_records_follow_from_their_sheets() -> None:
     assert phase.voltage(u_q, 2.0, 628.3) < 380.0 * math.sqrt(2.0 / 3.0)
 
 
-@pytest.mark.parametrize(
-    ("call", "message"),
-    [
-        (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), r"lacks motor\.limits\.thermal_time_constant_motor; data"),
-        (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, resistance=None))), r"lacks motor\.limits\.resistance, motor\.limits\.torque_constant"),
-        (lambda r: lm.sizing.temperatures(r, "m1"), 'motor: "m1" is none of the motors;'),
-        (lambda r: lm.sizing.temperatures(r, ambient="3 V"), "ambient"),
-        (lambda r: lm.sizing.temperatures(r, repeated=True, winding=30.0), "has no beginning; leave winding and case out"),
-        (lambda r: lm.sizing.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), "no end to its heat"),
-        (lambda r: lm.sizing.temperatures(r.drop_vars("motor_torque")), "the result lacks motor_torque"),
-        (lambda r: lm.sizing.temperatures(r.drop_attrs()), "carries no scenario"),
-        (lambda r: lm.sizing.motor_current(lm.simulate(run(0.1, torque_constant=None))), r"lacks motor\.limits\.torque_constant; give it, or a winding"),
-        (lambda r: run(0.1, thermal_resistance=3.2), "has thermal_resistance and both of its parts"),
-    ],
+test_what_lacks_or_contradicts_is_named = refusals_of(
+    lambda call: call(lm.simulate(run(0.1, duration=2.0))),
+    (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, thermal_time_constant_motor=None))), ": lacks motor.limits.thermal_time_constant_motor; data"),
+    (lambda r: lm.sizing.temperatures(lm.simulate(run(0.1, resistance=None))), ": lacks motor.limits.resistance, motor.limits.torque_constant"),
+    (lambda r: lm.sizing.temperatures(r, "m1"), 'motor: "m1" is none of the motors;'),
+    (lambda r: lm.sizing.temperatures(r, ambient="3 V"), ": ambient"),
+    (lambda r: lm.sizing.temperatures(r, repeated=True, winding=30.0), ": has no beginning; leave winding and case out"),
+    (lambda r: lm.sizing.temperatures(lm.simulate(run(3.0, duration=2.0)), repeated=True), ": no end to its heat"),
+    (lambda r: lm.sizing.temperatures(r.drop_vars("motor_torque")), ": the result lacks motor_torque"),
+    (lambda r: lm.sizing.temperatures(r.drop_attrs()), ": carries no scenario"),
+    (lambda r: lm.sizing.motor_current(lm.simulate(run(0.1, torque_constant=None))), ": lacks motor.limits.torque_constant; give it, or a winding"),
+    (lambda r: run(0.1, thermal_resistance=3.2), "motor.limits: has thermal_resistance and both of its parts"),
 )  # fmt: skip
-def test_what_lacks_or_contradicts_is_named(call, message) -> None:
-    refused(lambda: call(lm.simulate(run(0.1, duration=2.0))), match=message)
 
 
 def test_a_motor_of_a_train_is_chosen_by_name() -> None:

@@ -14,7 +14,7 @@ import lostmotion as lm
 from lostmotion.model.losses import LossMap
 from lostmotion.reproducible import interpolate
 from lostmotion.sizing.winding_temperature import COPPER, TwoBodies
-from refusals import refused
+from refusals import refusals, refusals_of, refused
 
 SERVO: dict[str, Any] = {
     "shafts": {"joint": {"inertia": 0.02, "friction_torque": 1.03}},
@@ -189,8 +189,10 @@ def test_a_falling_drag_curve_holds_its_last_torque() -> None:
     assert at <= 10.0
 
 
-def test_a_curve_that_falls_at_its_end_names_the_remedy() -> None:
-    assert 'give beyond = "hold", which keeps' in refused(lambda: lm.model.DragCurve(speeds=(0.0, 1.0, 2.0), torques=(0.0, 2.0, 1.0)))
+test_what_cannot_be_is_refused = refusals(
+    (lambda: lm.model.DragCurve(speeds=(0.0, 1.0, 2.0), torques=(0.0, 2.0, 1.0)), ': give beyond = "hold", which keeps'),
+    (lambda: lm.sizing.warm_up(lm.load("position-axis"), update="10 ms"), "controller"),
+)
 
 
 def test_an_eddy_current_brake_slows_down_as_its_law_says() -> None:
@@ -378,22 +380,14 @@ def test_a_dc_motor_has_the_line_of_its_warm_winding_and_magnets() -> None:
     assert float(stalled["motor_torque"][99]) == pytest.approx(0.1 * 4.0 * magnets / resistance, rel=1e-9)
 
 
-@pytest.mark.parametrize(
-    ("given", "said"),
-    [
-        ({"update": 0.03}, "even multiple"),
-        ({"update": 0.02}, "even multiple"),
-        ({"update": 2.0, "motor": "mtor"}, "did you mean motor"),
-        ({"update": 2.0, "magnet_coefficient": -0.001}, 'acts on a motor of kind "dc"'),
-        ({"update": 2.0, "heating": ["gear: mash"]}, "is no entry of the ledger"),
-    ],
+test_what_cannot_be_used_is_said_in_one_line = refusals_of(
+    lambda given: lm.sizing.warm_up(warming_axis(), **given),
+    ({"update": 0.03}, ": even multiple"),
+    ({"update": 0.02}, ": even multiple"),
+    ({"update": 2.0, "motor": "mtor"}, "motor: did you mean motor"),
+    ({"update": 2.0, "magnet_coefficient": -0.001}, ': acts on a motor of kind "dc"'),
+    ({"update": 2.0, "heating": ["gear: mash"]}, ": is no entry of the ledger"),
 )
-def test_what_cannot_be_used_is_said_in_one_line(given: dict[str, Any], said: str) -> None:
-    assert said in refused(lambda: lm.sizing.warm_up(warming_axis(), **given))
-
-
-def test_a_sampled_controller_is_refused() -> None:
-    refused(lambda: lm.sizing.warm_up(lm.load("position-axis"), update="10 ms"), "controller")
 
 
 def test_temperatures_reach_an_end_that_is_no_multiple_of_the_interval() -> None:

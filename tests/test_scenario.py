@@ -18,7 +18,7 @@ from lostmotion.model.motor import MotorLimits
 from lostmotion.model.torsion import Hysteresis, TorsionCurve
 from lostmotion.simulation.forms.drive_tables import DriveTables, LoadTable, drive_schema
 from lostmotion.simulation.forms.set_by_dotted_key import set_values
-from refusals import refused, refuses
+from refusals import refusals, refused
 
 
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
@@ -378,9 +378,10 @@ def test_what_is_given_beside_a_rated_voltage_does_not_follow_it() -> None:
         assert changed.rated_torque == motor.rated_torque
 
 
-def test_a_rated_voltage_that_does_not_reach_the_rated_torque_is_refused() -> None:
-    with refuses("motor.rated_voltage"):
-        lm.load("paper-2dof-nl-large", {"motor.rated_voltage": 7})
+test_what_cannot_be_is_refused = refusals(
+    (lambda: lm.load("paper-2dof-nl-large", {"motor.rated_voltage": 7}), "motor.rated_voltage"),
+    (lambda: lm.load("catalogue-robot-joint", {"motor.voltage_limit": 24, "motor.limits.max_voltage": 24}), "motor"),
+)
 
 
 def test_a_torque_source_refuses_what_it_has_no_use_for() -> None:
@@ -389,7 +390,3 @@ def test_a_torque_source_refuses_what_it_has_no_use_for() -> None:
         for key, value in (("rated_speed", 300), ("rated_voltage", 24), ("armature_voltage_constant", 3)):
             with pytest.raises(lm.InputError, match=f"has {key}, of no use to a torque_source"):
                 lm.load(name, {f"motor.{key}": value, "motor.kind": "torque_source"})
-
-
-def test_two_limits_of_one_voltage_are_refused() -> None:
-    refused(lambda: lm.load("catalogue-robot-joint", {"motor.voltage_limit": 24, "motor.limits.max_voltage": 24}), "motor")

@@ -14,7 +14,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.sizing.pull_out_curves import _Axis
-from refusals import refused
+from refusals import refusals_of, refused
 
 J, T_H, N = 5e-6, 0.3, 50
 STEP = 2.0 * math.pi / (4 * N)
@@ -145,16 +145,12 @@ def test_the_command_prints_the_curves_and_writes_them(tmp_path: Path) -> None:
     assert figure.read_bytes()[:4] == b"\x89PNG"
 
 
-@pytest.mark.parametrize(
-    ("scenario", "rates", "text"),
-    [
-        ("paper-2dof-nl-small", [100.0], 'no motor of kind "stepper"'),
-        ("stepper-belt-axis", [0.0], "must lie between 10 and 1e"),
-        ("stepper-belt-axis", "fast", "must be numbers"),
-    ],
+test_curves_that_make_no_sense_are_refused = refusals_of(
+    lambda scenario, rates: lm.sizing.stepper_curves(lm.load(ROOT / "scenarios" / f"{scenario}.toml"), rates),
+    ("paper-2dof-nl-small", [100.0], ': no motor of kind "stepper"'),
+    ("stepper-belt-axis", [0.0], ": must lie between 10 and 1e"),
+    ("stepper-belt-axis", "fast", ": must be numbers"),
 )
-def test_curves_that_make_no_sense_are_refused(scenario: str, rates, text: str) -> None:
-    refused(lambda: lm.sizing.stepper_curves(lm.load(ROOT / "scenarios" / f"{scenario}.toml"), rates), match=text)
 
 
 # --- steppers with a winding ---

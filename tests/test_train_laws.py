@@ -11,7 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.simulation.runs import core_runs
 from lostmotion.simulation.runs.separate_trains import parts_of
-from refusals import refused, refuses
+from refusals import refusals_of, refused, refuses
 from test_c_interface import OK, library  # noqa: F401
 from test_description import Scenario
 from test_drive_train import train
@@ -240,23 +240,19 @@ def test_a_brake_acts_after_its_delays() -> None:
     assert float(speed.sel(time=0.8, method="nearest")) == pytest.approx(10.0 - 2.0 * 0.27, abs=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("command", "delays", "message"),
-    [
-        (
-            {"ramps": [{"rise": 1, "duration": 0.1}]},
-            {"engagement_delay": 0.03},
-            "key command.b: is not made of steps; with an engagement or release delay, give mean and steps alone",
-        ),
-        (
-            {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 0.51}]},
-            {"engagement_delay": 0.03},
-            "key command.b: steps at 0.5 s and at 0.51 s, which after the delays would act in reverse order; leave more time between them",
-        ),
-    ],
+test_a_command_that_delays_cannot_shift_is_refused = refusals_of(
+    lambda command, delays: braked(command, **delays),
+    (
+        {"ramps": [{"rise": 1, "duration": 0.1}]},
+        {"engagement_delay": 0.03},
+        "command.b: is not made of steps; with an engagement or release delay, give mean and steps alone",
+    ),
+    (
+        {"steps": [{"height": 1, "time": 0.5}, {"height": -1, "time": 0.51}]},
+        {"engagement_delay": 0.03},
+        "command.b: steps at 0.5 s and at 0.51 s, which after the delays would act in reverse order; leave more time between them",
+    ),
 )
-def test_a_command_that_delays_cannot_shift_is_refused(command: Any, delays: dict[str, float], message: str) -> None:
-    assert message in refused(lambda: braked(command, **delays))
 
 
 @pytest.mark.parametrize(
