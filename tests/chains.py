@@ -3,6 +3,7 @@
 from typing import Any
 
 import lostmotion as lm
+from tables import gear_between, linear, run_of, torque_source
 
 
 def chain(n: int, *, friction: float = 0.0, gaps: tuple[int, ...] = (), **law: Any) -> lm.Scenario:
@@ -11,16 +12,10 @@ def chain(n: int, *, friction: float = 0.0, gaps: tuple[int, ...] = (), **law: A
     return lm.Scenario(
         shafts={f"m{k}": {"inertia": 1e-3, "friction_torque": friction, "viscous_friction": 1e-3} for k in range(n)},
         gears={
-            f"g{k}": {
-                "input": f"m{k}",
-                "output": f"m{k + 1}",
-                "ratio": 1.0,
-                "stiffness": curve if k in gaps else {"kind": "linear", "stiffness": 800.0},
-                "mesh_damping": 0.0 if k in gaps else 0.02,
-            }
+            f"g{k}": gear_between(f"m{k}", f"m{k + 1}", 1.0, curve if k in gaps else linear(800.0), mesh_damping=0.0 if k in gaps else 0.02)
             for k in range(n - 1)
         },
-        motors={"drive": {"shaft": "m0", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
+        motors={"drive": torque_source(1e-4, "m0", rated_torque=1.0)},
         command={"drive": law or {"mean": 0.1, "amplitude": 3.0, "frequency": 20.0}},
-        simulation={"duration": 0.1, "sample_interval": 1e-3},
+        simulation=run_of(0.1, 1e-3),
     )

@@ -28,6 +28,7 @@ import pytest
 import lostmotion as lm
 from lostmotion import _instruction_set
 from lostmotion.cli import main
+from tables import gear_between, mesh_efficiency, run_of, torque_source
 
 ROOT = Path(__file__).parent.parent
 ALL_SCENARIOS = sorted((ROOT / "scenarios").glob("*.toml"))
@@ -69,18 +70,10 @@ def jamming() -> lm.Scenario:
     """A rigid self-locking worm under a heavy load, which jams: its effective inertia is below zero."""
     return lm.Scenario(
         shafts={"worm": {}, "drum": {"inertia": 2.0, "torque": 20.0}},
-        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 1e-4}},
-        gears={
-            "gear": {
-                "input": "worm",
-                "output": "drum",
-                "ratio": 50,
-                "stiffness": {"kind": "rigid"},
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.44, "backdrive_efficiency": -0.2},
-            }
-        },
+        motors={"motor": torque_source(1e-4, "worm")},
+        gears={"gear": gear_between("worm", "drum", 50, {"kind": "rigid"}, losses=mesh_efficiency(0.44, -0.2))},
         initial={"speeds": {"worm": -100.0, "drum": -2.0}},
-        simulation={"duration": 0.1, "sample_interval": 1e-3},
+        simulation=run_of(0.1, 1e-3),
     )
 
 

@@ -228,7 +228,7 @@ FUNCTIONS = [
     *(
         (
             lambda s, t=t: lm.simulate(s, solver="dormand-prince", relative_tolerance=t),
-            f"relative_tolerance {t:g} must lie" if math.isfinite(t) else f"relative_tolerance: {t:g} must be a finite number",
+            f": relative_tolerance {t:g} must lie" if math.isfinite(t) else f": relative_tolerance: {t:g} must be a finite number",
         )
         for t in (math.nan, math.inf, -1.0, 0.0, 1e-300, 1.0)
     ),

@@ -20,6 +20,7 @@ from lostmotion.sizing.axis_rules import belt_rules
 from lostmotion.sizing.belt_ratings import of_profile, working_tension
 from lostmotion.sizing.supply import amplifier_rules
 from lostmotion.studies.selection.task_file import task_of
+from tables import rated_gearbox
 
 AXIS = ROOT / "scenarios" / "stepper-belt-axis.toml"
 
@@ -265,14 +266,7 @@ def test_currents_and_voltages_of_a_selection_are_effective_values_beside_amplit
         "load": {"inertia": 0.05, "torque": torque},
         "controller": {"encoder": {"ideal": True}, "reference": moves},
         "motor": {"from": "siemens-1ft7044-ak7"},
-        "gearbox": {
-            "ratio": ratio,
-            "inertia": 1e-6,
-            "rated_input_speed": 300.0,
-            "rated_output_torque": 50.0,
-            "stiffness": {"kind": "rigid"},
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        "gearbox": rated_gearbox(ratio, 300.0, 50.0, {"kind": "rigid"}, 1.0, inertia=1e-6),
     }
     row = lm.select(task_of(tables)).isel(pair=0)
     effective = torque / ratio / RMS

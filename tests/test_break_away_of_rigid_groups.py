@@ -10,6 +10,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import some
+from tables import mesh_efficiency
 
 linprog = pytest.importorskip("scipy.optimize").linprog
 STEP = 2e-3  # s between samples
@@ -25,11 +26,7 @@ def tree(seed: int, losses: bool) -> dict[str, Any]:
         scale[k] = scale[before] * ratio
         gears[f"g{k}"] = {"input": f"s{before}", "output": f"s{k}", "ratio": ratio}
         if losses and draw.random() < 0.6:
-            gears[f"g{k}"]["losses"] = {
-                "kind": "mesh_efficiency",
-                "drive_efficiency": draw.uniform(0.6, 0.95),
-                "backdrive_efficiency": draw.uniform(0.4, 0.9),
-            }
+            gears[f"g{k}"]["losses"] = mesh_efficiency(draw.uniform(0.6, 0.95), draw.uniform(0.4, 0.9))
     for k in range(n):
         friction = scale[k] * draw.uniform(0.1, 0.5)
         ramps = [{"rise": scale[k] * draw.uniform(-0.6, 0.6), "duration": 1.0, "begin": float(b)} for b in range(6)]

@@ -18,6 +18,7 @@ from lostmotion.model.angle_torques import TorqueCurve
 from lostmotion.model.mesh_stiffness import MeshStiffness
 from lostmotion.model.train import COUPLINGS, ON_SHAFTS
 from lostmotion.simulation.forms.initial_state import start_values
+from tables import gear_between, linked, run_of, torque_source
 
 LIBRARY = ROOT / "build" / "c" / "liblostmotion.so"
 STATES, INPUTS, VARIABLES, CAPACITIES = range(4)
@@ -248,24 +249,17 @@ def test_clutches_freewheels_and_torques_over_an_angle_have_the_bits_of_python(l
             "e": {"inertia": 0.01},
         },
         gears={
-            "mesh": {
-                "input": "d",
-                "output": "e",
-                "ratio": 2.0,
-                "stiffness": {"kind": "linear", "stiffness": 5.0},
-                "mesh_stiffness": {"teeth": 60, "pairs": [[0.0, 1.0], [0.4, 0.5], [0.7, 0.8]], "phase": 0.03},
-            }
+            "mesh": gear_between(
+                "d", "e", 2.0, 5.0, mesh_stiffness={"teeth": 60, "pairs": [[0.0, 1.0], [0.4, 0.5], [0.7, 0.8]], "phase": 0.03}
+            )
         },
-        motors={"motor": {"shaft": "a", "kind": "torque_source", "rated_torque": 4.0, "rotor_inertia": 0.01}},
-        clutches={
-            "clutch": {"input": "a", "output": "b", "torque": 3.0, "breakaway_torque": 3.5},
-            "limiter": {"kind": "safety", "input": "c", "output": "d", "torque": 1.5},
-        },
-        freewheels={"freewheel": {"input": "b", "output": "c"}},
+        motors={"motor": torque_source(0.01, "a", rated_torque=4.0)},
+        clutches={"clutch": linked("a", "b", torque=3.0, breakaway_torque=3.5), "limiter": linked("c", "d", kind="safety", torque=1.5)},
+        freewheels={"freewheel": linked("b", "c")},
         angle_torques={"cogging": {"kind": "curve", "shaft": "d", "angles": [0, 1.5, 4], "torques": [0, 1.2, -1.2]}},
         springs={"stops": {"shaft": "d", "stiffness": {"kind": "curve", "backlash": 0.2, "slopes": [9.0]}}},
         command={"clutch": {"mean": 1.0}},
-        simulation={"duration": 1.0, "sample_interval": 1e-3},
+        simulation=run_of(1.0, 1e-3),
     )
     python, there = lm.Simulation(scenario, step=1e-3), Train(library, scenario).simulation(1e-3)
     inputs = there.names(INPUTS)
@@ -290,10 +284,8 @@ def test_a_given_motion_has_the_bits_of_python(library: c.CDLL) -> None:
     """Angle, speed and acceleration, and two of them; the torque that they take is a variable."""
     scenario = lm.Scenario(
         shafts={"crank": {"inertia": 0.02, "friction_torque": 0.5, "speed": 0.0}, "lever": {"inertia": 0.3, "friction_torque": 0.2}},
-        gears={
-            "mesh": {"input": "crank", "output": "lever", "ratio": 2.0, "stiffness": {"kind": "curve", "backlash": 0.01, "slopes": [800.0]}}
-        },
-        simulation={"duration": 1.0, "sample_interval": 0.02},
+        gears={"mesh": gear_between("crank", "lever", 2.0, {"kind": "curve", "backlash": 0.01, "slopes": [800.0]})},
+        simulation=run_of(1.0, 0.02),
     )
     train = Train(library, scenario, given=["crank"])
     python, there = lm.Simulation(scenario, step=0.02), train.simulation(0.02)

@@ -19,6 +19,7 @@ import lostmotion as lm
 from conftest import some
 from lostmotion.simulation.forms.key_aliases import DRIVE
 from refusals import refused
+from tables import constant_efficiency, gear_between, run_of, torque_source
 
 J = 1.0  # kg m2
 PID = {"gain": 4.0, "integral_gain": 1.5, "derivative_gain": 0.8}
@@ -109,17 +110,11 @@ def test_with_static_friction_it_hunts_in_proportion_to_the_excess() -> None:
 TWO_MASSES: dict[str, Any] = {
     "shafts": {"motor": {"inertia": 0.002, "viscous_friction": 0.01}, "load": {"inertia": 0.05, "viscous_friction": 0.02}},
     "gears": {
-        "belt": {
-            "input": "motor",
-            "output": "load",
-            "ratio": 4.0,
-            "stiffness": {"kind": "linear", "stiffness": 300.0},
-            "rated_input_speed": 100.0,
-            "rated_output_torque": 20.0,
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        }
+        "belt": gear_between(
+            "motor", "load", 4.0, 300.0, rated_input_speed=100.0, rated_output_torque=20.0, losses=constant_efficiency(1.0)
+        )
     },
-    "motors": {"servo": {"shaft": "motor", "kind": "torque_source", "rated_torque": 2.0, "rotor_inertia": 0.0}},
+    "motors": {"servo": torque_source(0.0, "motor", rated_torque=2.0)},
 }
 LOOP: dict[str, Any] = {
     "kind": "continuous",
@@ -129,9 +124,7 @@ LOOP: dict[str, Any] = {
 
 
 def two_masses(duration: float = 2.0, interval: float = 0.05, **controller: Any) -> lm.Scenario:
-    return lm.Scenario(
-        **TWO_MASSES, controllers={"servo": LOOP | controller}, simulation={"duration": duration, "sample_interval": interval}
-    )
+    return lm.Scenario(**TWO_MASSES, controllers={"servo": LOOP | controller}, simulation=run_of(duration, interval))
 
 
 def plant_rates(w: float, load: float, twist: float, torque: float) -> tuple[float, float, float]:

@@ -23,6 +23,7 @@ from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
 from lostmotion.sizing.finding import RULES, Finding
 from lostmotion.sizing.holding import holding
 from refusals import refused
+from tables import rated_gearbox, run_of, torque_source
 
 RPM = math.pi / 30.0
 
@@ -36,11 +37,10 @@ def move(duration: float = 0.25, **changes) -> lm.Scenario:
     torque = {"steps": [{"height": 0.5}, {"height": -1.0, "time": 0.1}, {"height": 0.5, "time": 0.2}]}
     scenario = lm.Scenario(
         command=torque,
-        motor={
-            "kind": "torque_source",
-            "rotor_inertia": 1e-4,
-            "rated_torque": 1.0,
-            "limits": {
+        motor=torque_source(
+            1e-4,
+            rated_torque=1.0,
+            limits={
                 "continuous_torque": 0.6,
                 "torque_constant": 0.05,
                 "resistance": 0.2,
@@ -50,18 +50,11 @@ def move(duration: float = 0.25, **changes) -> lm.Scenario:
                 "max_voltage": 48.0,
                 "max_current": 12.0,
             },
-        },
-        gearbox={
-            "ratio": 50.0,
-            "rated_input_speed": 300.0,
-            "rated_output_torque": 20.0,
-            "stiffness": {"kind": "rigid"},
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-            "limits": {"peak_output_torque": 40.0, "max_input_speed": 600.0},
-        },
+        ),
+        gearbox=rated_gearbox(50.0, 300.0, 20.0, {"kind": "rigid"}, 1.0, limits={"peak_output_torque": 40.0, "max_input_speed": 600.0}),
         load={"inertia": 0.25},
         task={"max_lost_motion": 1e-3},
-        simulation={"duration": duration, "sample_interval": 1e-3},
+        simulation=run_of(duration, 1e-3),
     )
     return scenario.replace(**changes)
 

@@ -12,21 +12,16 @@ import lostmotion as lm
 from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.key_aliases import DRIVE
 from refusals import refusals_of, refused
+from tables import rated_gearbox, run_of, torque_source
 
 MOVES = {"moves": [{"to": "90 deg"}], "speed": "3 rad/s", "acceleration": "20 rad/s^2", "jerk": "800 rad/s^3"}
 FLANKS = {"kind": "rigid", "backlash": "2 mrad", "restitution": 0.4}
 SHORT: dict[str, Any] = {
-    "motor": {"kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0},
-    "gearbox": {
-        "ratio": 10.0,
-        "rated_input_speed": "3000 rpm",
-        "rated_output_torque": 8.0,
-        "stiffness": {"kind": "curve", "backlash": "2 mrad", "slopes": [2000.0]},
-        "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-    },
+    "motor": torque_source(1e-4, rated_torque=1.0),
+    "gearbox": rated_gearbox(10.0, "3000 rpm", 8.0, {"kind": "curve", "backlash": "2 mrad", "slopes": [2000.0]}, 1.0),
     "load": {"inertia": 0.02, "friction_torque": 0.1, "torque": {"mean": 0.5}},
     "command": {"amplitude": 0.5, "frequency": 3.0},
-    "simulation": {"duration": 1.0, "sample_interval": 2e-3},
+    "simulation": run_of(1.0, 2e-3),
 }
 
 

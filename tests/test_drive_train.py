@@ -19,6 +19,7 @@ from lostmotion.simulation.forms.initial_state import start_values
 from lostmotion.simulation.forms.key_aliases import DRIVE
 from lostmotion.simulation.forms.train_tables import TrainTables, train_schema
 from refusals import refused
+from tables import gear_between, run_of, torque_source
 
 TRAIN: dict[str, Any] = {
     "shafts": {
@@ -26,20 +27,14 @@ TRAIN: dict[str, Any] = {
         "worm": {"inertia": "1 kg*cm^2"},
         "table": {"inertia": "2 kg*m^2", "friction_torque": 0.5, "torque": {"mean": "20 N*m"}},
     },
-    "motors": {"m1": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-4}},
+    "motors": {"m1": torque_source(1e-4, "motor")},
     "gears": {
-        "belt": {"input": "motor", "output": "worm", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": 300.0}},
-        "worm": {
-            "input": "worm",
-            "output": "table",
-            "ratio": 50.0,
-            "stiffness": {"kind": "linear", "stiffness": 1e4},
-            "losses": {"kind": "worm", "lead_angle": "4 deg", "friction_coefficient": 0.084},
-        },
+        "belt": gear_between("motor", "worm", 2.0, 300.0),
+        "worm": gear_between("worm", "table", 50.0, 1e4, losses={"kind": "worm", "lead_angle": "4 deg", "friction_coefficient": 0.084}),
     },
     "brakes": {"hold": {"shaft": "motor", "torque": "1 N*m"}},
     "command": {"hold": 0, "m1": {"amplitude": 0.3, "frequency": "1 Hz"}},
-    "simulation": {"duration": "0.5 s", "sample_interval": "1 ms"},
+    "simulation": run_of("0.5 s", "1 ms"),
 }
 
 

@@ -18,6 +18,7 @@ from full_equations import Axis
 from lostmotion.reports.run import summary
 from lostmotion.simulation.runs.run import whole_run
 from refusals import refused
+from tables import rated_gearbox, run_of
 
 T = 125e-6
 
@@ -59,16 +60,10 @@ def scenario(a: Axis, ticks: int, **controller: Any) -> lm.Scenario:
             **controller,
         },
         motor=motor(a),
-        gearbox={
-            "ratio": a.ratio,
-            "rated_input_speed": 100.0,
-            "rated_output_torque": 1.0,
-            "stiffness": stiffness,
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        gearbox=rated_gearbox(a.ratio, 100.0, 1.0, stiffness, 1.0),
         load={"inertia": a.J_Z, "viscous_friction": a.friction, "torque": {"mean": a.load_torque[0][1], "steps": steps}},
         initial={"motor_speed": a.x[1], "load_speed": a.x[3], "load_angle": a.x[2], "twist": a.x[0] / a.ratio - a.x[2]},
-        simulation={"duration": ticks * a.tick, "sample_interval": a.tick},
+        simulation=run_of(ticks * a.tick, a.tick),
     )
 
 

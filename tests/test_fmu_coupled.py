@@ -13,6 +13,7 @@ from scipy.integrate import solve_ivp
 import lostmotion as lm
 import pendulum_fmu as joint
 import speed_controller as law
+from tables import gear_between, run_of
 
 NANOSECOND = 1e-9
 DURATION = 1.0
@@ -104,16 +105,8 @@ def test_a_drive_in_the_joint_of_a_pendulum_converges_to_the_equations_of_both(t
     motor, flange, ratio, stiffness, damping, torque = 1e-4, 0.02, 50.0, 2000.0, 2.0, 0.2
     scenario = lm.Scenario(
         shafts={"motor": {"inertia": motor, "torque": -torque}, "joint": {"inertia": flange}},
-        gears={
-            "gear": {
-                "input": "motor",
-                "output": "joint",
-                "ratio": ratio,
-                "stiffness": {"kind": "linear", "stiffness": stiffness},
-                "mesh_damping": damping,
-            }
-        },
-        simulation={"duration": DURATION, "sample_interval": 1e-3},
+        gears={"gear": gear_between("motor", "joint", ratio, stiffness, mesh_damping=damping)},
+        simulation=run_of(DURATION, 1e-3),
     )
     lm.export_fmu(scenario, tmp_path / "drive.fmu", motion_inputs=["joint"])
     pendulum = builder.build_FMU(joint.__file__, dest=tmp_path)

@@ -23,6 +23,7 @@ from conftest import ROOT
 from lostmotion.portable import fmu_export as exporting
 from lostmotion.portable.dependencies import dependencies_of
 from lostmotion.simulation.forms.key_aliases import DRIVE
+from tables import gear_between, run_of, torque_source
 
 BUILT = Path(os.environ.get("LOSTMOTION_FMU_LIBRARIES", ROOT / "src" / "lostmotion" / "fmu_libraries"))
 WINE = shutil.which("wine64", path=f"{os.environ['PATH']}:/usr/lib/wine")
@@ -135,16 +136,9 @@ def test_accelerations_of_a_soft_gear_depend_on_their_own_side(tmp_path: Path) -
     """By Newton's law: each side has its own torque, and the spring and damper of the gear between them."""
     scenario = lm.Scenario(
         shafts={"motor": {}, "joint": {"inertia": 0.2, "torque": 0.0}},
-        motors={"servo": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 3e-5, "rated_torque": 1.0}},
-        gears={
-            "gear": {
-                "input": "motor",
-                "output": "joint",
-                "ratio": 50.0,
-                "stiffness": {"kind": "curve", "backlash": 0.0, "slopes": [8000.0]},
-            }
-        },
-        simulation={"duration": 1.0, "sample_interval": 0.01},
+        motors={"servo": torque_source(3e-5, "motor", rated_torque=1.0)},
+        gears={"gear": gear_between("motor", "joint", 50.0, {"kind": "curve", "backlash": 0.0, "slopes": [8000.0]})},
+        simulation=run_of(1.0, 0.01),
     )
     states = ("motor_speed", "joint_speed", "gear_twist", "joint_angle")
     found = dependencies_of(scenario, states, ("servo_command", "joint_load_torque"))

@@ -13,6 +13,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from conftest import some
 from refusals import refusals, refused
+from tables import gear_between, run_of
 
 SPRING = {"kind": "linear", "stiffness": 100.0}
 CASE: dict[str, Any] = {
@@ -58,11 +59,8 @@ def test_a_straight_line_of_speed_is_a_matrix_exponential() -> None:
             "second": {"inertia": J[0], "viscous_friction": c},
             "third": {"inertia": J[1]},
         },
-        gears={
-            "a": {"input": "first", "output": "second", "ratio": 2.0, "stiffness": {"kind": "linear", "stiffness": K[0]}},
-            "b": {"input": "second", "output": "third", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": K[1]}},
-        },
-        simulation={"duration": 1.5, "sample_interval": 0.125},
+        gears={"a": gear_between("first", "second", 2.0, K[0]), "b": gear_between("second", "third", 1.0, K[1])},
+        simulation=run_of(1.5, 0.125),
     )
     r = lm.simulate(s)
     A = np.zeros((6, 6))  # w1, w2, twist a, twist b, t, 1
@@ -104,9 +102,7 @@ def test_friction_takes_nothing_while_the_given_speed_is_zero() -> None:
     """A move of up, hold and down: 0.5 N m only while it lasts, and exactly none before and after, where the drive holds all."""
     points = {"times": (0.5, 0.8, 1.1, 1.4), "values": (0.0, 0.3, 0.3, 0.0)}
     s = scenario(
-        shafts={"crank": {"inertia": 1.0, "friction_torque": 0.5, "speed": {"samples": points}}},
-        gears={},
-        simulation={"duration": 2.0, "sample_interval": 0.05},
+        shafts={"crank": {"inertia": 1.0, "friction_torque": 0.5, "speed": {"samples": points}}}, gears={}, simulation=run_of(2.0, 0.05)
     )
     r = lm.simulate(s)
     t = r.time.values
@@ -391,15 +387,7 @@ def test_a_given_shaft_needs_no_inertia_behind_backlash(ratio: float) -> None:
     """Its speed follows from no balance: all others move as with any inertia of it, and its torque is what the mesh takes."""
     tables: dict[str, Any] = {
         "shafts": {"p": {"speed": {"amplitude": 5.0, "frequency": 1.3}}, "x": {"inertia": 15.0, "friction_torque": 1.0}},
-        "gears": {
-            "g": {
-                "input": "p",
-                "output": "x",
-                "ratio": ratio,
-                "stiffness": {"kind": "curve", "slopes": [1e4], "backlash": 1e-3},
-                "mesh_damping": 30.0,
-            }
-        },
+        "gears": {"g": gear_between("p", "x", ratio, {"kind": "curve", "slopes": [1e4], "backlash": 1e-3}, mesh_damping=30.0)},
     }
     alone = lm.simulate(scenario(**tables))
     heavy = lm.simulate(scenario(**tables | {"shafts": {**tables["shafts"], "p": {**tables["shafts"]["p"], "inertia": 2.0}}}))

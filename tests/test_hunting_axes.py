@@ -9,6 +9,7 @@ import numpy as np
 import lostmotion as lm
 from conftest import some
 from lostmotion.servo.hunting.limit_cycles import UndrivenLoop
+from tables import constant_efficiency
 
 AXES = some(24, 12)
 SLIPS = 30  # that a run of an axis which hunts has at least
@@ -46,11 +47,7 @@ def random_axis(rng: random.Random) -> lm.Scenario:
     load: dict[str, Any] = {"inertia": (1.0 - share) * inertia, "friction_torque": sliding, "breakaway_torque": breakaway}
     if rng.random() < 0.5:
         load["viscous_friction"] = log(0.01, 0.5) * k_d
-    gear: dict[str, Any] = {
-        "ratio": ratio,
-        "losses": {"kind": "constant_efficiency", "efficiency": rng.choice([1.0, 0.9])},
-        "stiffness": {"kind": "rigid"},
-    }
+    gear: dict[str, Any] = {"ratio": ratio, "losses": constant_efficiency(rng.choice([1.0, 0.9])), "stiffness": {"kind": "rigid"}}
     if rng.random() < 0.4:
         resonance = w * log(6.0, 60.0)
         stiffness = resonance**2 * (1.0 - share) * share * inertia

@@ -14,6 +14,7 @@ from lostmotion.servo.hunting.limit_cycle_causes import at_rest, limit_cycle
 from lostmotion.servo.linear_regimes import axis_of, regimes
 from lostmotion.servo.margins import instability
 from lostmotion.simulation.runs.run import run
+from tables import run_of
 
 SEEDS = range(20_260_101, 20_260_101 + some(4, 2))
 AXES = some(50, 10)  # of each seed
@@ -28,12 +29,7 @@ def one_inertia(
     motor = {"kind": "torque_source", "shaft": "rotor", "rotor_inertia": 1e-4, "rated_torque": 0.5}
     reference = {"kind": "position", "steps": [{"time": 0.05, "height": height}]}
     controller = {"sample_time": sample_time, "reference": reference, "speed": {"torque_limit": 0.5} | speed, **loops}
-    return lm.Scenario(
-        shafts={"rotor": rotor},
-        motors={"m": motor},
-        controllers={"m": controller},
-        simulation={"duration": duration, "sample_interval": 0.01},
-    )
+    return lm.Scenario(shafts={"rotor": rotor}, motors={"m": motor}, controllers={"m": controller}, simulation=run_of(duration, 0.01))
 
 
 def geared(of: lm.Scenario, backlash: float, friction: float) -> lm.Scenario:

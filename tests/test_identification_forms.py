@@ -11,6 +11,7 @@ import lostmotion as lm
 from dry_friction import angles, write_log
 from lostmotion.inputs.toml_text import toml_text
 from refusals import refused
+from tables import rated_gearbox
 
 COULOMB, VISCOUS, INERTIA = 0.06, 3e-3, 3e-4  # at the motor
 TASK: dict[str, Any] = {"logs": {"files": ["l*.csv"]}, "fit": {"regression": False}}
@@ -21,13 +22,7 @@ FORMS: dict[str, dict[str, Any]] = {
         "rig": {
             "command": {},
             "motor": {**MOTOR, "rotor_inertia": INERTIA - 0.01 / 100.0},
-            "gearbox": {
-                "ratio": 10.0,
-                "rated_input_speed": 300.0,
-                "rated_output_torque": 20.0,
-                "stiffness": {"kind": "rigid"},
-                "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-            },
+            "gearbox": rated_gearbox(10.0, 300.0, 20.0, {"kind": "rigid"}, 1.0),
             "load": {"inertia": 0.01},
         },
         "input": "command",

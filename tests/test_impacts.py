@@ -11,6 +11,7 @@ import lostmotion as lm
 from conftest import some
 from lostmotion.errors import InputError
 from refusals import refusals_of
+from tables import gear_between, run_of
 
 Vector = NDArray[np.float64]
 
@@ -28,11 +29,9 @@ def pair(
     """Two shafts whose flanks strike; torques that drive them [N·m]."""
     return lm.Scenario(
         shafts={"a": {"inertia": inertias[0], "torque": torques[0]}, "b": {"inertia": inertias[1], "torque": torques[1]}},
-        gears={
-            "mesh": {"input": "a", "output": "b", "ratio": ratio, "stiffness": {"kind": "rigid", "backlash": backlash, "restitution": e}}
-        },
+        gears={"mesh": gear_between("a", "b", ratio, {"kind": "rigid", "backlash": backlash, "restitution": e})},
         initial=initial,
-        simulation={"duration": duration, "sample_interval": duration / 200.0},
+        simulation=run_of(duration, duration / 200.0),
     )
 
 
@@ -239,23 +238,14 @@ def group(**changes: Any) -> lm.Scenario:
             "end": {"inertia": 0.1},
         },
         "gears": {
-            "first": {"input": "rotor", "output": "pinion", "ratio": -2.0},
-            "mesh": {
-                "input": "pinion",
-                "output": "wheel",
-                "ratio": 3.0,
-                "stiffness": {"kind": "rigid", "backlash": 0.02, "restitution": 0.4},
-            },
-            "second": {"input": "wheel", "output": "table", "ratio": 1.5},
-            "soft": {
-                "input": "table",
-                "output": "end",
-                "ratio": 1.0,
-                "stiffness": {"kind": "curve", "backlash": 0.01, "slopes": [300.0]},
-                "hysteresis": {"efficiency": 0.9},
-            },
+            "first": gear_between("rotor", "pinion", -2.0),
+            "mesh": gear_between("pinion", "wheel", 3.0, {"kind": "rigid", "backlash": 0.02, "restitution": 0.4}),
+            "second": gear_between("wheel", "table", 1.5),
+            "soft": gear_between(
+                "table", "end", 1.0, {"kind": "curve", "backlash": 0.01, "slopes": [300.0]}, hysteresis={"efficiency": 0.9}
+            ),
         },
-        "simulation": {"duration": 1.0, "sample_interval": 2e-3},
+        "simulation": run_of(1.0, 2e-3),
     }
     return lm.Scenario(**(tables | changes))
 
@@ -306,12 +296,9 @@ def test_flanks_in_a_row_strike_at_once_without_a_gain_of_energy() -> None:
     stiffness = {"kind": "rigid", "backlash": 0.02, "restitution": 0.5}
     scenario = lm.Scenario(
         shafts={"a": {"inertia": 1.0, "torque": 0.0}, "b": {"inertia": 0.5}, "c": {"inertia": 2.0}},
-        gears={
-            "one": {"input": "a", "output": "b", "ratio": 1.0, "stiffness": stiffness},
-            "two": {"input": "b", "output": "c", "ratio": 1.0, "stiffness": stiffness},
-        },
+        gears={"one": gear_between("a", "b", 1.0, stiffness), "two": gear_between("b", "c", 1.0, stiffness)},
         initial={"speeds": {"a": 1.0}, "twists": {"two": 0.01}},
-        simulation={"duration": 0.0101, "sample_interval": 1e-4},
+        simulation=run_of(0.0101, 1e-4),
     )
     result = lm.simulate(scenario)
     # u_1 = w_a - w_b from 1 to -1/2, u_2 = w_b - w_c stays 0: b and c are one body of 2.5 kg m^2.

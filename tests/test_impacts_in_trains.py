@@ -11,6 +11,7 @@ import pytest
 
 import lostmotion as lm
 from impact_reference import Chain, Vector, random_chain
+from tables import gear_between, mesh_efficiency, run_of, torque_source
 
 # Of the random cases, this share is tried; `LOSTMOTION_CASES=1` tries all.
 SHARE = float(os.environ.get("LOSTMOTION_CASES", "0.02"))
@@ -177,19 +178,10 @@ def worm(stiffness: float | None, *, eta_b: float = -0.3, mass: float = 2.0) -> 
     damping = {} if stiffness is None else {"mesh_damping": 0.6 * math.sqrt(stiffness * mass)}
     return lm.Scenario(
         shafts={"worm": {"inertia": 1e-4}, "drum": {"inertia": mass, "torque": {"mean": 5.0, "steps": [{"time": 0.1, "height": -25.0}]}}},
-        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0}},
-        gears={
-            "gear": {
-                "input": "worm",
-                "output": "drum",
-                "ratio": 50.0,
-                "stiffness": mesh,
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.4, "backdrive_efficiency": eta_b},
-                **damping,
-            }
-        },
+        motors={"motor": torque_source(0.0, "worm")},
+        gears={"gear": gear_between("worm", "drum", 50.0, mesh, losses=mesh_efficiency(0.4, eta_b), **damping)},
         command={"motor": {"mean": 0.5, "steps": [{"time": 0.1, "height": -0.5}]}},
-        simulation={"duration": 0.3, "sample_interval": 1e-3},
+        simulation=run_of(0.3, 1e-3),
     )
 
 
@@ -259,18 +251,10 @@ def test_a_gear_that_locks_as_its_inputs_jump_goes_on_from_rest_until_it_locks_a
                 "torque": {"mean": load[0], "steps": [{"time": step, "height": load[1] - load[0]}]},
             },
         },
-        motors={"motor": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0}},
-        gears={
-            "gear": {
-                "input": "worm",
-                "output": "drum",
-                "ratio": 1.0,
-                "stiffness": {"kind": "rigid"},
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": eta, "backdrive_efficiency": -0.3},
-            }
-        },
+        motors={"motor": torque_source(0.0, "worm")},
+        gears={"gear": gear_between("worm", "drum", 1.0, {"kind": "rigid"}, losses=mesh_efficiency(eta, -0.3))},
         command={"motor": {"mean": M[0], "steps": [{"time": step, "height": M[1] - M[0]}]}},
-        simulation={"duration": 0.5, "sample_interval": 0.0033},
+        simulation=run_of(0.5, 0.0033),
     )
     result = lm.simulate(scenario)
     t, w = result["time"].values, result["worm_speed"].values
@@ -307,19 +291,13 @@ def self_locking_chain(draw: np.random.Generator) -> tuple[lm.Scenario, float, f
     torque = driving * 10.0
     scenario = lm.Scenario(
         shafts={f"s{k}": {"inertia": J[k]} for k in range(n + 1)},
-        motors={"m": {"shaft": "s0", "kind": "torque_source", "rotor_inertia": 0.0}},
+        motors={"m": torque_source(0.0, "s0")},
         gears={
-            f"g{k}": {
-                "input": f"s{k}",
-                "output": f"s{k + 1}",
-                "ratio": ratio[k],
-                "stiffness": {"kind": "rigid"},
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": drive[k], "backdrive_efficiency": back[k]},
-            }
+            f"g{k}": gear_between(f"s{k}", f"s{k + 1}", ratio[k], {"kind": "rigid"}, losses=mesh_efficiency(drive[k], back[k]))
             for k in range(n)
         },
         command={"m": {"mean": torque, "steps": [{"time": 0.1, "height": -2.0 * torque}]}},
-        simulation={"duration": 0.3, "sample_interval": 0.013},
+        simulation=run_of(0.3, 0.013),
     )
     return scenario, torque, driving, slowing, sum(J[k] / np.prod(ratio[:k]) ** 2 for k in range(n + 1))
 

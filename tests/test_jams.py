@@ -11,6 +11,7 @@ import pytest
 
 import lostmotion as lm
 from locking_trains import locking_train
+from tables import direct_current, gear_between, linked, mesh_efficiency, run_of, torque_source
 
 # Of the random cases, this share is tried; `LOSTMOTION_CASES=1` tries all.
 SHARE = float(os.environ.get("LOSTMOTION_CASES", "0.05"))
@@ -39,30 +40,17 @@ def flywheel(inertia: float, stiffness: float | None, beside: int = 0) -> lm.Sce
             "drum": {"inertia": 2.0, "torque": {"mean": 5.0, "steps": [{"time": 0.1, "height": -25.0}]}},
             **{name: {"inertia": 0.01, "friction_torque": 0.1} for name in others},
         },
-        motors={
-            "drive": {"shaft": "worm", "kind": "torque_source", "rotor_inertia": 0.0},
-            "slow": {"shaft": "flywheel", "kind": "torque_source", "rotor_inertia": 0.0},
-        },
-        freewheels={"free": {"input": "flywheel", "output": "worm"}},
+        motors={"drive": torque_source(0.0, "worm"), "slow": torque_source(0.0, "flywheel")},
+        freewheels={"free": linked("flywheel", "worm")},
         gears={
-            "gear": {
-                "input": "worm",
-                "output": "drum",
-                "ratio": 50.0,
-                "stiffness": mesh,
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.4, "backdrive_efficiency": -0.3},
-                **damping,
-            },
-            **{
-                f"to_{b}": {"input": a, "output": b, "ratio": 2.0, "stiffness": hangs, "hysteresis": {"efficiency": 0.8}}
-                for a, b in itertools.pairwise(["drum", *others])
-            },
+            "gear": gear_between("worm", "drum", 50.0, mesh, losses=mesh_efficiency(0.4, -0.3), **damping),
+            **{f"to_{b}": gear_between(a, b, 2.0, hangs, hysteresis={"efficiency": 0.8}) for a, b in itertools.pairwise(["drum", *others])},
         },
         command={
             "drive": {"mean": 0.5, "steps": [{"time": 0.1, "height": -0.5}]},
             "slow": {"mean": 50.0 * inertia, "steps": [{"time": 0.1, "height": -50.0 * inertia}]},
         },
-        simulation={"duration": 0.11, "sample_interval": 1e-3},
+        simulation=run_of(0.11, 1e-3),
     )
 
 
@@ -104,16 +92,8 @@ def against(stiffness: float | None) -> lm.Scenario:
     mesh = {"kind": "rigid"} if stiffness is None else {"kind": "linear", "stiffness": stiffness}
     return lm.Scenario(
         shafts={"worm": {"inertia": 0.001}, "table": {"speed": {"amplitude": 0.02, "frequency": 0.5}}},
-        gears={
-            "gear": {
-                "input": "worm",
-                "output": "table",
-                "ratio": 9.0,
-                "stiffness": mesh,
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.7, "backdrive_efficiency": -0.3},
-            }
-        },
-        simulation={"duration": 0.5, "sample_interval": 0.01},
+        gears={"gear": gear_between("worm", "table", 9.0, mesh, losses=mesh_efficiency(0.7, -0.3))},
+        simulation=run_of(0.5, 0.01),
     )
 
 
@@ -149,33 +129,15 @@ def at_rest_beside(**held: Any) -> lm.Scenario:
         },
         command={"clutch": 1.0},
         gears={
-            "x5": {"input": "s3", "output": "s5", "ratio": 1.767, "stiffness": curve | {"backlash": 9.6e-3, "slopes": [3910.0]}},
-            "x7": {
-                "input": "s5",
-                "output": "s7",
-                "ratio": 5.19,
-                "stiffness": curve | {"backlash": 4.65e-4, "slopes": [13567.0]},
-                "hysteresis": {"efficiency": 0.913},
-            },
-            "x13": {"input": "s3", "output": "s13", "ratio": 6.3, "stiffness": curve | {"backlash": 1.68e-3, "slopes": [26859.0]}},
-            "wedge": {
-                "input": "s3",
-                "output": "s20",
-                "ratio": 0.588,
-                "losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.536, "backdrive_efficiency": 0.536},
-            },
+            "x5": gear_between("s3", "s5", 1.767, curve | {"backlash": 9.6e-3, "slopes": [3910.0]}),
+            "x7": gear_between("s5", "s7", 5.19, curve | {"backlash": 4.65e-4, "slopes": [13567.0]}, hysteresis={"efficiency": 0.913}),
+            "x13": gear_between("s3", "s13", 6.3, curve | {"backlash": 1.68e-3, "slopes": [26859.0]}),
+            "wedge": gear_between("s3", "s20", 0.588, losses=mesh_efficiency(0.536, 0.536)),
         },
-        dampers={
-            "x3": {"input": "s0", "output": "s3", "viscous_friction": 10.0},
-            "x10": {"input": "s6", "output": "s10", "viscous_friction": 1.05},
-        },
-        freewheels={
-            "x6": {"input": "s0", "output": "s6"},
-            "x14": {"input": "s7", "output": "s14"},
-            "x19": {"input": "s10", "output": "s19"},
-        },
-        clutches={"clutch": {"input": "s5", "output": "s24", "torque": 0.104, "kind": "friction"}},
-        simulation={"duration": 0.02, "sample_interval": 1e-3},
+        dampers={"x3": linked("s0", "s3", viscous_friction=10.0), "x10": linked("s6", "s10", viscous_friction=1.05)},
+        freewheels={"x6": linked("s0", "s6"), "x14": linked("s7", "s14"), "x19": linked("s10", "s19")},
+        clutches={"clutch": linked("s5", "s24", torque=0.104, kind="friction")},
+        simulation=run_of(0.02, 1e-3),
     )
 
 
@@ -204,19 +166,9 @@ def test_two_torques_over_one_angle_are_their_sum() -> None:
     sum_of = sum(a * cmath.exp(1j * p) for a, p in laws.values())
     common: dict[str, Any] = {
         "shafts": {"rotor": {"inertia": 0.0, "friction_torque": 0.02}},
-        "motors": {
-            "m": {
-                "shaft": "rotor",
-                "kind": "dc",
-                "rotor_inertia": 0.04,
-                "rated_torque": 1.0,
-                "rated_speed": 100.0,
-                "armature_voltage_constant": 13.0,
-                "electrical_time_constant": 0.00056,
-            }
-        },
+        "motors": {"m": direct_current(0.04, 1.0, 100.0, 0.00056, 13.0, "rotor")},
         "command": {"m": {"amplitude": 0.7, "frequency": 9.0, "phase": 2.0}},
-        "simulation": {"duration": 0.1, "sample_interval": 0.001},
+        "simulation": run_of(0.1, 0.001),
     }
     two = {name: {"shaft": "rotor", "kind": "sine", "amplitude": a, "phase": p} for name, (a, p) in laws.items()}
     one = {"c": {"shaft": "rotor", "kind": "sine", "amplitude": abs(sum_of), "phase": cmath.phase(sum_of)}}
@@ -235,33 +187,13 @@ def test_a_torque_between_shafts_at_rest_ends_with_the_capacity_that_holds_it() 
         constant = {"kind": "constant_efficiency", "efficiency": 0.68}
         return lm.Scenario(
             shafts={"a": {"inertia": 0.2}, "b": {"inertia": 0.3}, "c": {}, "d": {"friction_torque": 0.2}},
-            motors={
-                "m": {
-                    "shaft": "d",
-                    "kind": "dc",
-                    "rotor_inertia": 0.001,
-                    "rated_torque": 1.0,
-                    "rated_speed": 100.0,
-                    "armature_voltage_constant": 10.0,
-                    "electrical_time_constant": 0.005,
-                }
-            },
+            motors={"m": direct_current(0.001, 1.0, 100.0, 0.005, 10.0, "d")},
             command={"m": 0.9},
             gears={
-                "x1": {"input": "a", "output": "b", "ratio": 2.0, "stiffness": spring, "losses": locks},
-                "x2": {
-                    "input": "b",
-                    "output": "c",
-                    "ratio": 90.0,
-                    "stiffness": {"kind": "curve", "backlash": 0.0005, "slopes": [4396.306451040023]},
-                },
-                "x3": {
-                    "input": "c",
-                    "output": "d",
-                    "ratio": 2.0,
-                    "stiffness": {"kind": "curve", "backlash": 0.001, "slopes": [147921.0279792854]},
-                },
-                "closing": {"input": "a", "output": "d", "ratio": 0.6, "losses": constant, **closing},
+                "x1": gear_between("a", "b", 2.0, spring, losses=locks),
+                "x2": gear_between("b", "c", 90.0, {"kind": "curve", "backlash": 0.0005, "slopes": [4396.306451040023]}),
+                "x3": gear_between("c", "d", 2.0, {"kind": "curve", "backlash": 0.001, "slopes": [147921.0279792854]}),
+                "closing": gear_between("a", "d", 0.6, losses=constant, **closing),
             },
             mass_matrices={
                 "j": {
@@ -269,7 +201,7 @@ def test_a_torque_between_shafts_at_rest_ends_with_the_capacity_that_holds_it() 
                     "matrix": [[0.014768608594581978, 0.0003421195468940676], [0.0003421195468940676, 0.0011858531666905168]],
                 }
             },
-            simulation={"duration": 0.7, "sample_interval": 0.001},
+            simulation=run_of(0.7, 0.001),
         )
 
     result = lm.simulate(scenario())
@@ -297,11 +229,8 @@ def test_samples_of_a_large_train_are_right_though_matrices_are_given_up_between
                 shafts={
                     s: {**load, "torque": {"amplitude": 0.3, "frequency": 1.0 + 0.137 * k, "phase": 0.7 * k}} for k, s in enumerate(names)
                 },
-                gears={
-                    f"g{k}": {"input": a, "output": b, "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": 1.0}}
-                    for k, (a, b) in enumerate(itertools.pairwise(names))
-                },
-                simulation={"duration": 0.4, "sample_interval": interval},
+                gears={f"g{k}": gear_between(a, b, 1.0, 1.0) for k, (a, b) in enumerate(itertools.pairwise(names))},
+                simulation=run_of(0.4, interval),
             )
         )
 
@@ -354,9 +283,7 @@ def test_torques_at_rest_after_a_stop_do_not_depend_on_the_last_bit() -> None:
     before, *after = (
         {name: at_end(run, f"{name}_output_torque") for name in ("x1", "x2", "x3")}
         for end in (0.28374, 0.2838, 0.285, 0.297, 0.31, 0.34, 0.38)
-        for run in [
-            lm.simulate(lm.Scenario(**{k: v for k, v in tables.items() if v}).replace(simulation={"duration": end, "sample_interval": end}))
-        ]
+        for run in [lm.simulate(lm.Scenario(**{k: v for k, v in tables.items() if v}).replace(simulation=run_of(end, end)))]
     )
     for torques in after:
         assert torques == pytest.approx(before, rel=1e-3)

@@ -10,6 +10,7 @@ from scipy.linalg import expm
 import lostmotion as lm
 from conftest import some
 from refusals import refusals_of, refuses
+from tables import gear_between, linear
 
 FIRST = {"k": 800.0, "c": 3.0}
 SECOND = {"k": 2000.0, "c": 0.5}
@@ -19,11 +20,8 @@ RATIO = 2.0  # of the second stage
 def chain(inertia: float = 0.0, *, first: dict[str, Any] | None = None, **changes: Any) -> lm.Scenario:
     """Two inertias, and between two compliant stages a shaft of which nothing but dampers determines the speed."""
     gears = {
-        "first": {"input": "a", "output": "node", "ratio": 1.0, "mesh_damping": FIRST["c"]}
-        | {"stiffness": {"kind": "linear", "stiffness": FIRST["k"]}}
-        | (first or {}),
-        "second": {"input": "node", "output": "b", "ratio": RATIO, "mesh_damping": SECOND["c"]}
-        | {"stiffness": {"kind": "linear", "stiffness": SECOND["k"]}},
+        "first": gear_between("a", "node", 1.0, mesh_damping=FIRST["c"]) | {"stiffness": linear(FIRST["k"])} | (first or {}),
+        "second": gear_between("node", "b", RATIO, mesh_damping=SECOND["c"]) | {"stiffness": linear(SECOND["k"])},
     }
     tables: dict[str, Any] = {
         "shafts": {
@@ -145,10 +143,7 @@ def test_two_of_them_in_a_row_and_one_tied_to_another() -> None:
     )
     one = lm.Scenario(
         shafts=shafts,
-        gears={
-            "s": {"input": "a", "output": "b", "ratio": 1.0, "mesh_damping": 2.0 / 3.0}
-            | {"stiffness": {"kind": "linear", "stiffness": 300.0}}
-        },
+        gears={"s": gear_between("a", "b", 1.0, mesh_damping=2.0 / 3.0) | {"stiffness": linear(300.0)}},
         initial=start,
         simulation=times,
     )

@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 import lostmotion as lm
 from lostmotion.reports.run import summary
+from tables import gear_between
 
 TEETH, CONTACT_RATIO, FEWER = 20, 1.6, 0.6
 STIFFNESS, INERTIA, RATIO, TWIST = 200.0, 1e-3, 2.0, 1e-3
@@ -190,7 +191,4 @@ def test_what_is_no_mesh_is_refused_in_one_line(mesh: dict[str, Any], said: str)
 
 def test_a_rigid_gear_has_no_stiffness_to_scale() -> None:
     with pytest.raises(lm.InputError, match=r"gears\.g.*mesh_stiffness.*rigid"):
-        lm.Scenario(
-            shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}},
-            gears={"g": {"input": "a", "output": "b", "ratio": 2, "mesh_stiffness": MESH}},
-        )
+        lm.Scenario(shafts={"a": {"inertia": 1.0}, "b": {"inertia": 1.0}}, gears={"g": gear_between("a", "b", 2, mesh_stiffness=MESH)})

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 import lostmotion as lm
+from tables import gear_between
 
 Vector = NDArray[np.float64]
 TIGHT: dict[str, float] = {"rtol": 1e-12, "atol": 1e-13}
@@ -178,10 +179,7 @@ def test_first() -> None:
             "gear": {"inertia": 2.0, "viscous_friction": 10.0},
             "load": {"inertia": 2.0},
         },
-        gears={
-            "ideal": {"input": "motor", "output": "gear", "ratio": 10.0},
-            "spring": {"input": "gear", "output": "load", "ratio": 1.0, "stiffness": {"kind": "linear", "stiffness": 1e4}},
-        },
+        gears={"ideal": gear_between("motor", "gear", 10.0), "spring": gear_between("gear", "load", 1.0, 1e4)},
         simulation=simulation(1.0),
     )
     # The motor counts 100-fold at the output of the gear.

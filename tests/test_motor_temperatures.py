@@ -12,6 +12,7 @@ from lostmotion.data_sheets.components import motor_table
 from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.winding_temperature import COPPER, TwoBodies, mean_square
 from refusals import refusals_of, refused
+from tables import run_of
 
 THERMAL = {
     "thermal_resistance_winding_case": "0.8 K/W",
@@ -133,11 +134,7 @@ def test_the_error_bound_holds_for_random_runs_that_are_sampled_coarsely(seed: i
         "frequency": float(random.uniform(0.2, 8.0)),
     }
     scenario = lm.load("paper-2dof-nl-small").replace(
-        **{
-            "motor.limits": {"resistance": 0.3, "torque_constant": 0.06, **THERMAL},
-            "command": command,
-            "simulation": {"duration": 10.0, "sample_interval": 1.0},
-        }
+        **{"motor.limits": {"resistance": 0.3, "torque_constant": 0.06, **THERMAL}, "command": command, "simulation": run_of(10.0, 1.0)}
     )
     coarse, fine = (lm.sizing.temperatures(lm.simulate(scenario, sample_interval=h), winding="40 degC") for h in (1.0, 5e-3))
     bounds = [found.attrs["error_bound"] for found in (coarse, fine)]

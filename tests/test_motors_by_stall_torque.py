@@ -15,6 +15,7 @@ from lostmotion.model.losses import LossMap
 from lostmotion.reproducible import interpolate
 from lostmotion.sizing.winding_temperature import COPPER, TwoBodies
 from refusals import refusals, refusals_of, refused
+from tables import run_of
 
 SERVO: dict[str, Any] = {
     "shafts": {"joint": {"inertia": 0.02, "friction_torque": 1.03}},
@@ -78,9 +79,7 @@ def test_currents_put_the_friction_into_the_line() -> None:
     assert own.friction_torque == pytest.approx(T, rel=1e-15)
     assert own.armature_voltage_constant is not None
     assert own.rated_torque * own.armature_voltage_constant - T == pytest.approx(2.0, rel=1e-15)
-    free = lm.Scenario(
-        shafts={"s": {}}, motors={"m": own}, command={"m": {"mean": 1.0}}, simulation={"duration": 20.0, "sample_interval": 0.1}
-    )
+    free = lm.Scenario(shafts={"s": {}}, motors={"m": own}, command={"m": {"mean": 1.0}}, simulation=run_of(20.0, 0.1))
     assert float(lm.simulate(free)["s_speed"][-1]) == pytest.approx(50.0, rel=1e-9)
 
 
@@ -364,12 +363,7 @@ def test_a_dc_motor_has_the_line_of_its_warm_winding_and_magnets() -> None:
         "armature_voltage_constant": 4.0,
         "limits": LIMITS,
     }
-    drive = lm.Scenario(
-        shafts={"rotor": {"inertia": 1e-5}},
-        motors={"motor": motor},
-        command={"motor": 1.0},
-        simulation={"duration": 0.4, "sample_interval": 1e-3},
-    )
+    drive = lm.Scenario(shafts={"rotor": {"inertia": 1e-5}}, motors={"motor": motor}, command={"motor": 1.0}, simulation=run_of(0.4, 1e-3))
     hot = lm.sizing.warm_up(drive, update=0.1, winding=125.0, housing=65.0, magnet_coefficient=-0.002)
     resistance, magnets = 1.0 + COPPER * 100.0, 1.0 - 0.002 * 40.0
     no_load = lm.load("worm-lowering") and 2.0 * math.pi * 50.0 * 4.0 / 3.0
@@ -393,9 +387,7 @@ test_what_cannot_be_used_is_said_in_one_line = refusals_of(
 def test_temperatures_reach_an_end_that_is_no_multiple_of_the_interval() -> None:
     """As with an interval that the duration is a multiple of: heat over the same intervals of frozen temperatures."""
     part, whole = (
-        lm.sizing.warm_up(
-            warming_axis(command={"motor": 0.1}, simulation={"duration": 15.99, "sample_interval": h}), update=0.4, lubricant=OIL
-        )
+        lm.sizing.warm_up(warming_axis(command={"motor": 0.1}, simulation=run_of(15.99, h)), update=0.4, lubricant=OIL)
         for h in (0.02, 0.01)
     )
     assert part.time.values[-2:].tolist() == [15.98, 15.99]

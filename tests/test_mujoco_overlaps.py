@@ -8,6 +8,7 @@ import pytest
 
 import lostmotion as lm
 from refusals import refusals_of, refused
+from tables import gear_between, torque_source
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
 
@@ -131,10 +132,7 @@ def test_a_weight_on_a_shaft_that_turns_with_the_joint_is_refused_or_left_to_the
 
 
 def test_loads_before_a_joint_and_on_a_slide_are_named_by_the_keys_of_the_file() -> None:
-    motor, moved = (
-        {"kind": "torque_source", "rotor_inertia": 1e-5},
-        "<joint name='arm' type='slide' axis='0 0 1'/><geom size='.1' mass='3'/>",
-    )
+    motor, moved = (torque_source(1e-5), "<joint name='arm' type='slide' axis='0 0 1'/><geom size='.1' mass='3'/>")
     robot = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody><body>{moved}</body></worldbody></mujoco>")
     for key, value in {"inclination": 0.5 * math.pi, "force": 5.0}.items():
         axis = {"motor": motor, "screw": {"lead": 0.01}, "slide": {"mass": 3.0, key: value}}
@@ -244,10 +242,7 @@ def test_an_arm_behind_a_safety_clutch_is_the_joint() -> None:
 def test_a_scenario_of_two_stages_turns_a_joint_with_its_controller() -> None:
     stages = {
         "shafts": {"motor": {}, "middle": {"inertia": 1e-5}, "arm": {"inertia": 1.0}},
-        "gears": {
-            "first": {"input": "motor", "output": "middle", "ratio": 5.0},
-            "second": {"input": "middle", "output": "arm", "ratio": 10.0},
-        },
+        "gears": {"first": gear_between("motor", "middle", 5.0), "second": gear_between("middle", "arm", 10.0)},
         "controllers": {"m": CONTROLLER},
     }
     arm = lm.mujoco.attach(model(), {"arm": scenario(**stages)})
@@ -264,10 +259,7 @@ def test_a_chain_of_gears_that_is_held_stays_where_it_is() -> None:
     soft = {"kind": "linear", "stiffness": 300.0}
     chain = {
         "shafts": {"motor": {"friction_torque": 0.05}, "middle": {"inertia": 1e-5}, "arm": {"inertia": 1.0}},
-        "gears": {
-            "first": {"input": "motor", "output": "middle", "ratio": -5.0, "stiffness": soft},
-            "second": {"input": "middle", "output": "arm", "ratio": 10.0, "stiffness": soft},
-        },
+        "gears": {"first": gear_between("motor", "middle", -5.0, soft), "second": gear_between("middle", "arm", 10.0, soft)},
     }
     arm = lm.mujoco.attach(model(), {"arm": scenario(**chain)})
     arm.data.qpos[0] = 1.2

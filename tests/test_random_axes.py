@@ -8,6 +8,7 @@ import pytest
 
 import lostmotion as lm
 from conftest import some
+from tables import gear_between
 
 TRAVEL = {"screws": ("lead", 0.005, 0.03), "racks": ("travel_per_turn", 0.05, 0.2), "belts": ("travel_per_turn", 0.05, 0.2)}  # fmt: skip
 
@@ -56,13 +57,7 @@ def random_axis(seed: int) -> lm.Scenario:
         between = r.uniform(-0.8, 0.8) * float(np.sqrt(own * other))
         matrices["both"] = {"shafts": ["slide", "other"], "matrix": [[own, between], [between, other]]}
     kind = r.choice(list(TRAVEL))
-    gear = {
-        "input": "rotor",
-        "output": "shaft",
-        "ratio": r.choice([-3.0, 1.0, 2.5, -1.5]),
-        "stiffness": {"kind": "linear", "stiffness": 10.0 ** r.uniform(2.0, 3.3)},
-        "mesh_damping": r.uniform(0.0, 0.5),
-    }
+    gear = gear_between("rotor", "shaft", r.choice([-3.0, 1.0, 2.5, -1.5]), 10.0 ** r.uniform(2.0, 3.3), mesh_damping=r.uniform(0.0, 0.5))
     command = {"mean": r.uniform(-0.2, 0.2), "amplitude": r.uniform(0.2, 1.0), "frequency": r.uniform(1.0, 5.0)}
     return lm.Scenario(
         shafts={"rotor": {}, "shaft": {"inertia": 10.0 ** r.uniform(-4.0, -3.0), "friction_torque": r.uniform(0.0, 0.1)}},

@@ -18,6 +18,7 @@ from lostmotion.simulation.variables import VARIABLES
 from lostmotion.studies.expressions.functions import FUNCTIONS
 from lostmotion.studies.runs.chunk import scenario_of_run
 from refusals import refused
+from tables import run_of
 
 
 @pytest.fixture(scope="module")
@@ -279,10 +280,7 @@ WINCH: dict[str, Any] = {
     "simulation": {"duration": END, "sample_interval": 0.01},
 }
 # A shaft that a constant torque of 1 N m accelerates: its speed is the time.
-RISING: dict[str, Any] = {
-    "shafts": {"s": {"inertia": 1.0, "torque": {"mean": -1.0}}},
-    "simulation": {"duration": 1.03, "sample_interval": 0.1},
-}
+RISING: dict[str, Any] = {"shafts": {"s": {"inertia": 1.0, "torque": {"mean": -1.0}}}, "simulation": run_of(1.03, 0.1)}
 
 
 def rising(duration: float, interval: float = 0.1) -> lm.Scenario:
@@ -379,8 +377,6 @@ def test_a_mean_over_samples_weighs_the_last_by_its_interval(tmp_path: Path, eng
 @pytest.mark.parametrize(("interval", "said"), [(0.1, True), (1e-3, False)])
 def test_a_summary_says_that_its_peaks_are_those_of_few_samples(interval: float, said: bool) -> None:
     """A command of 3 Hz every 0.1 s has 3.33 samples in a period."""
-    scenario = lm.load("paper-2dof-nl-large").replace(
-        command={"amplitude": 0.5, "frequency": 3.0}, simulation={"duration": 0.5, "sample_interval": interval}
-    )
+    scenario = lm.load("paper-2dof-nl-large").replace(command={"amplitude": 0.5, "frequency": 3.0}, simulation=run_of(0.5, interval))
     text = summary(lm.simulate(scenario))
     assert ("peaks are those of the samples, 3.33 in a period of 3 Hz" in text) == said

@@ -15,6 +15,7 @@ import pytest
 import lostmotion as lm
 from conftest import ALL_SCENARIOS, some
 from lostmotion.studies.study.study_definition import Study
+from tables import constant_efficiency, direct_current, gear_between, linear, linked, run_of
 
 NAMED = {path.stem: path for path in ALL_SCENARIOS}
 FOR_EVER = {"simulation.duration": 1e7, "simulation.sample_interval": 1e4}
@@ -47,22 +48,11 @@ def latched_clutch(duration: float) -> lm.Scenario:
             "s1": {"inertia": 0.03, "friction_torque": 0.02, "torque": {}},
             "s2": {"inertia": 0.005441417539413996, "friction_torque": 0.1427285220148735},
         },
-        motors={
-            "m0": {
-                "shaft": "s0",
-                "kind": "dc",
-                "rotor_inertia": 0.008,
-                "rated_torque": 5.998570434619682,
-                "friction_torque": 0.3,
-                "rated_speed": 265.3055293370166,
-                "electrical_time_constant": 0.00014890440350378697,
-                "armature_voltage_constant": 12.6,
-            }
-        },
+        motors={"m0": direct_current(0.008, 5.998570434619682, 265.3055293370166, 0.00014890440350378697, 12.6, "s0", friction_torque=0.3)},
         command={"m0": {"amplitude": 0.02, "frequency": 0.7, "phase": 2.0}},
-        clutches={"x2": {"input": "s1", "output": "s2", "torque": 20.0, "kind": "safety"}},
-        dampers={"x1": {"input": "s0", "output": "s1", "viscous_friction": 1.0421993803316991}},
-        simulation={"duration": duration, "sample_interval": 0.00625},
+        clutches={"x2": linked("s1", "s2", torque=20.0, kind="safety")},
+        dampers={"x1": linked("s0", "s1", viscous_friction=1.0421993803316991)},
+        simulation=run_of(duration, 0.00625),
     )
 
 
@@ -86,17 +76,7 @@ def two_shafts_at_their_limits() -> lm.Scenario:
             "s2": {"inertia": 0.009987781234138227, "friction_torque": 0.005660826554047997, "viscous_friction": 0.0001450462366078829},
             "s3": {"inertia": 0.3585288458220457, "friction_torque": 0.020276980299298555},
         },
-        motors={
-            "m0": {
-                "shaft": "s2",
-                "kind": "dc",
-                "rotor_inertia": 0.019782303163847964,
-                "rated_torque": 0.21280182267098696,
-                "rated_speed": 284.0122006182779,
-                "armature_voltage_constant": 12.6,
-                "electrical_time_constant": 0.0002811748193650458,
-            }
-        },
+        motors={"m0": direct_current(0.019782303163847964, 0.21280182267098696, 284.0122006182779, 0.0002811748193650458, 12.6, "s2")},
         command={
             "x2": 0.7,
             "b": 0.5,
@@ -108,33 +88,27 @@ def two_shafts_at_their_limits() -> lm.Scenario:
             },
         },
         gears={
-            "x1": {
-                "input": "s0",
-                "output": "s1",
-                "ratio": 8.072003981777065,
-                "mesh_damping": 0.27580166128814276,
-                "damping_limited": True,
-                "stiffness": {"kind": "curve", "backlash": 0.008992098938129366, "slopes": [139325.03751347077]},
-                "losses": {"kind": "constant_efficiency", "efficiency": 0.6266484683685396},
-            },
-            "closing": {
-                "input": "s0",
-                "output": "s3",
-                "ratio": 2.3867100993418626,
-                "stiffness": {"kind": "linear", "stiffness": 576864.6066618726},
-                "losses": {"kind": "constant_efficiency", "efficiency": 0.5068261413307877},
-            },
+            "x1": gear_between(
+                "s0",
+                "s1",
+                8.072003981777065,
+                {"kind": "curve", "backlash": 0.008992098938129366, "slopes": [139325.03751347077]},
+                mesh_damping=0.27580166128814276,
+                damping_limited=True,
+                losses=constant_efficiency(0.6266484683685396),
+            ),
+            "closing": gear_between("s0", "s3", 2.3867100993418626, 576864.6066618726, losses=constant_efficiency(0.5068261413307877)),
         },
         clutches={
-            "x2": {"input": "s1", "output": "s2", "torque": 2.2120610224504884, "kind": "friction"},
-            "x3": {"input": "s1", "output": "s3", "torque": 0.43279117781608384, "kind": "safety"},
+            "x2": linked("s1", "s2", torque=2.2120610224504884, kind="friction"),
+            "x3": linked("s1", "s3", torque=0.43279117781608384, kind="safety"),
         },
         brakes={"b": {"shaft": "s1", "torque": 2.0694700035197005}},
-        springs={"k": {"shaft": "s3", "stiffness": {"kind": "linear", "stiffness": 50.607799342222435}}},
+        springs={"k": {"shaft": "s3", "stiffness": linear(50.607799342222435)}},
         angle_torques={
             "c": {"shaft": "s3", "kind": "sine", "amplitude": 0.05839213500333903, "order": 1, "phase": 0.5078347527358091, "error": 1e-8}
         },
-        simulation={"duration": 0.3, "sample_interval": 3e-3},
+        simulation=run_of(0.3, 3e-3),
     )
 
 
@@ -163,22 +137,12 @@ def test_a_turn_is_not_looked_for_beyond_the_end_of_a_motion_that_grows() -> Non
             "s2": {"friction_torque": 0.002},
             "s4": {"friction_torque": 0.018, "viscous_friction": 0.06, "torque": {"mean": -2.8}},
         },
-        motors={
-            "m": {
-                "shaft": "s4",
-                "kind": "dc",
-                "rotor_inertia": 0.007,
-                "rated_torque": 0.72,
-                "rated_speed": 60.0,
-                "armature_voltage_constant": 12.6,
-                "electrical_time_constant": 1.2e-4,
-            }
-        },
+        motors={"m": direct_current(0.007, 0.72, 60.0, 1.2e-4, 12.6, "s4")},
         command={"m": {"mean": -0.18}},
-        gears={"x1": {"input": "s0", "output": "s1", "ratio": 20.0, "stiffness": {"kind": "curve", "backlash": 2.4e-4, "slopes": [200.0]}}},
-        clutches={"x2": {"input": "s1", "output": "s2", "torque": 6.0, "kind": "safety"}},
+        gears={"x1": gear_between("s0", "s1", 20.0, {"kind": "curve", "backlash": 2.4e-4, "slopes": [200.0]})},
+        clutches={"x2": linked("s1", "s2", torque=6.0, kind="safety")},
         mass_matrices={"j": {"shafts": ["s2", "s4"], "matrix": [[500.0, 0.002], [0.002, 1.3e-8]]}},
-        simulation={"duration": 2e-3, "sample_interval": 1e-4},
+        simulation=run_of(2e-3, 1e-4),
     )
     with interrupted_after(10.0, signal.ITIMER_PROF):
         exact = lm.simulate(scenario)
@@ -218,16 +182,9 @@ def random_train(rng: random.Random) -> lm.Scenario:
             tables["clutches"][f"c{k}"] = ends | {"torque": log(-2.0, 1.5), "kind": "safety"}
         if kind != "clutches":
             tables["dampers"][f"d{k}"] = ends | {"viscous_friction": log(-4.0, 1.0)}
-    motor = {
-        "shaft": "s0",
-        "kind": "dc",
-        "rotor_inertia": log(-5.0, -2.0),
-        "rated_torque": log(-1.0, 1.0),
-        "friction_torque": log(-3.0, 0.0),
-        "rated_speed": log(1.5, 2.7),
-        "electrical_time_constant": log(-7.0, -2.5),
-        "armature_voltage_constant": log(0.3, 1.3),
-    }
+    motor = direct_current(
+        log(-5.0, -2.0), log(-1.0, 1.0), log(1.5, 2.7), log(-7.0, -2.5), log(0.3, 1.3), "s0", friction_torque=log(-3.0, 0.0)
+    )
     command = {"amplitude": log(-3.0, 0.0), "frequency": log(-1.0, 1.5), "phase": rng.uniform(0.0, 6.3)}
     duration = rng.choice([0.02, 0.1]) * rng.uniform(0.5, 1.5)
     interval = duration / rng.choice([1, 2, 4, 7, 33.3])

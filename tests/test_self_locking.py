@@ -12,6 +12,7 @@ from conftest import ROOT
 from lostmotion.data_sheets.components import gearbox_table
 from lostmotion.model.self_locking import SelfLocking
 from refusals import refused
+from tables import run_of
 
 RATIO, WORM, MASS, STIFFNESS, LOAD = 50.0, 1e-4, 2.0, 1e4, 20.0
 
@@ -131,9 +132,7 @@ def test_a_disturbance_grows_at_the_rate_that_is_said():
         "twists": {"gear": LOAD / STIFFNESS + d},
     }
     tables = worm_tables()
-    run = lm.simulate(
-        scenario(tables, command={"motor": -0.2 * LOAD / RATIO}, initial=start, simulation={"duration": 0.15, "sample_interval": 1e-3})
-    )
+    run = lm.simulate(scenario(tables, command={"motor": -0.2 * LOAD / RATIO}, initial=start, simulation=run_of(0.15, 1e-3)))
     grown = run["gear_output_torque"].values - LOAD
     assert grown == pytest.approx(first * np.exp(rate * run["time"].values), rel=1e-7)
     assert grown[-1] > 1000.0 * first
@@ -397,11 +396,7 @@ def test_a_motor_without_inertia_is_explained_and_checked() -> None:
     """Beside no inertia the load has infinitely much, and nothing swings against it."""
     motor = {"kind": "torque_source", "rotor_inertia": 0.0, "rated_torque": 1.0}
     slide = {"mass": 10.0, "friction_force": 10.0}
-    axis = lm.Scenario(
-        axis={"motor": motor, "belt": {"travel_per_turn": 0.1}, "slide": slide},
-        command=0.5,
-        simulation={"duration": 0.1, "sample_interval": 0.01},
-    )
+    axis = lm.Scenario(axis={"motor": motor, "belt": {"travel_per_turn": 0.1}, "slide": slide}, command=0.5, simulation=run_of(0.1, 0.01))
     assert lm.sizing.self_locking(axis.train(), "belt", load_torque=1.0).inertia_ratio == math.inf
     radius = 0.1 / (2.0 * math.pi)
     assert f"above {10.0 * radius:.4g}" in str(lm.explain(axis, 0.05))

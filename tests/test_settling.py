@@ -16,6 +16,7 @@ from lostmotion.servo.hunting.limit_cycle_causes import at_rest
 from lostmotion.servo.linear_regimes import axis_of
 from lostmotion.servo.settling import Moves, Settling, State, default_window, repeated, settling
 from refusals import refused
+from tables import rated_gearbox
 from two_mass import k, two_mass
 
 ARCMIN = math.pi / 10800.0
@@ -239,13 +240,7 @@ def drive_of(r: random.Random, inertia: float, ratio: float) -> tuple[dict[str, 
     load = inertia * ratio**2 * log(r, 0.3, 6.0)
     stiffness = (2.0 * math.pi * log(r, 12.0, 60.0)) ** 2 * load
     curve = {"kind": "curve", "slopes": [stiffness], "backlash": r.choice([0.0, log(r, 1.0, 10.0) * ARCMIN])}
-    gearbox = {
-        "ratio": ratio,
-        "rated_input_speed": 300.0,
-        "rated_output_torque": 1e3 * inertia * ratio,
-        "stiffness": curve,
-        "losses": {"kind": "constant_efficiency", "efficiency": r.choice([1.0, r.uniform(0.6, 0.97)])},
-    }
+    gearbox = rated_gearbox(ratio, 300.0, 1e3 * inertia * ratio, curve, r.choice([1.0, r.uniform(0.6, 0.97)]))
     table = {"inertia": load, "viscous_friction": r.choice([0.0, 0.1, 1.0]) * load, "torque": 0.0}
     return gearbox, table, inertia + load / ratio**2
 

@@ -11,6 +11,7 @@ import pytest
 import lostmotion as lm
 from conftest import lostmotion
 from refusals import refused
+from tables import run_of
 
 ARCMIN = math.radians(1.0 / 60.0)
 
@@ -37,12 +38,7 @@ def turning(gears: dict[str, Any], duration: float, **more: Any) -> lm.Scenario:
         shafts[g["output"]], speeds[g["output"]] = {"inertia": 1e-3}, speed
     motor = {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-3, "rated_torque": 1.0}
     return lm.Scenario(
-        shafts=shafts,
-        motors={"m": motor},
-        gears=gears,
-        initial={"speeds": speeds},
-        simulation={"duration": duration, "sample_interval": 0.1},
-        **more,
+        shafts=shafts, motors={"m": motor}, gears=gears, initial={"speeds": speeds}, simulation=run_of(duration, 0.1), **more
     )
 
 

@@ -15,6 +15,7 @@ from conftest import ROOT
 from lostmotion.cli import app
 from lostmotion.sizing.pull_out_curves import _Axis
 from refusals import refusals_of, refused
+from tables import gear_between, rated_gearbox, stepper
 
 J, T_H, N = 5e-6, 0.3, 50
 STEP = 2.0 * math.pi / (4 * N)
@@ -105,22 +106,12 @@ def test_the_swing_is_that_of_a_linear_rotor_under_the_steps(share: float) -> No
 
 
 FORMS = {
-    "short": {
-        "motor": MOTOR,
-        "gearbox": {
-            "ratio": 10,
-            "rated_input_speed": 300.0,
-            "rated_output_torque": 3.0,
-            "stiffness": {"kind": "linear", "stiffness": 500.0},
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
-        "load": {"inertia": 3e-4},
-    },
+    "short": {"motor": MOTOR, "gearbox": rated_gearbox(10, 300.0, 3.0, 500.0, 1.0), "load": {"inertia": 3e-4}},
     "axis": {"axis": {"motor": MOTOR, "screw": {"lead": "10 mm", "stiffness": "50 N/um"}, "slide": {"mass": 1.0}}},
     "long": {
         "shafts": {"rotor": {"inertia": 0.0}, "load": {"inertia": 3e-4}},
         "motors": {"m": {"shaft": "rotor", **MOTOR}},
-        "gears": {"g": {"input": "rotor", "output": "load", "ratio": 10}},
+        "gears": {"g": gear_between("rotor", "load", 10)},
     },
 }
 
@@ -156,16 +147,7 @@ test_curves_that_make_no_sense_are_refused = refusals_of(
 # --- steppers with a winding ---
 
 
-NEMA_17 = {
-    "kind": "stepper",
-    "steps_per_revolution": 200,
-    "holding_torque": 0.44,
-    "rotor_inertia": 54e-7,
-    "rated_current": 1.7,
-    "resistance_phase": 1.5,
-    "inductance_phase": 2.8e-3,
-    "supply_voltage": 24.0,
-}
+NEMA_17 = stepper(54e-7, 200, 0.44, rated_current=1.7, resistance_phase=1.5, inductance_phase=2.8e-3, supply_voltage=24.0)
 REGULATION = 1e5  # [1/s], as docs/steppers.md states it
 DURATION = 0.02
 
@@ -176,19 +158,18 @@ def random_case(seed: int) -> lm.Scenario:
     T_H = float(10.0 ** draw.uniform(-1.0, 0.5))
     steps = int(draw.choice([200, 400]))
     J = 1.2e-5 * T_H * float(draw.uniform(0.5, 4.0))
-    motor = {
-        "shaft": "motor",
-        "kind": "stepper",
-        "steps_per_revolution": steps,
-        "holding_torque": T_H,
-        "detent_torque": T_H * float(draw.choice([0.0, 0.04])),
-        "rotor_inertia": J,
-        "rated_current": float(draw.uniform(0.5, 4.0)),
-        "resistance_phase": float(draw.uniform(0.3, 5.0)),
-        "inductance_phase": float(draw.uniform(0.5e-3, 8e-3)),
-        "supply_voltage": float(draw.uniform(12.0, 60.0)),
-        "standstill_current": float(draw.choice([1.0, 0.5])),
-    }
+    motor = stepper(
+        J,
+        steps,
+        T_H,
+        "motor",
+        detent_torque=T_H * float(draw.choice([0.0, 0.04])),
+        rated_current=float(draw.uniform(0.5, 4.0)),
+        resistance_phase=float(draw.uniform(0.3, 5.0)),
+        inductance_phase=float(draw.uniform(0.5e-3, 8e-3)),
+        supply_voltage=float(draw.uniform(12.0, 60.0)),
+        standstill_current=float(draw.choice([1.0, 0.5])),
+    )
     speed = float(draw.uniform(2.0, 20.0))
     stepping = {
         "reference": {"ramps": [{"duration": 0.7 * DURATION, "rise": 0.7 * speed * DURATION}]},

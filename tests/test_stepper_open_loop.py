@@ -9,6 +9,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from lostmotion.cli import app
 from refusals import refused
+from tables import rated_gearbox, run_of
 
 ARCMIN = math.pi / 10_800.0
 STEPS, T_H, J, RATIO = 200, 0.5, 60e-7, 20.0
@@ -69,19 +70,10 @@ def test_a_load_that_rings_settles_when_its_envelope_enters_the_window():
 def test_the_short_form_and_an_axis_have_the_same_report():
     short = lm.Scenario(
         motor=MOTOR,
-        gearbox={
-            "ratio": RATIO,
-            "inertia": 0.0,
-            "viscous_friction": 5e-3,
-            "rated_output_torque": 10.0,
-            "rated_input_speed": 100.0,
-            "stiffness": {"kind": "linear", "stiffness": 2e4},
-            "mesh_damping": 10.0,
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        gearbox=rated_gearbox(RATIO, 100.0, 10.0, 2e4, 1.0, inertia=0.0, viscous_friction=5e-3, mesh_damping=10.0),
         load={"inertia": 0.01, "friction_torque": 0.2},
         command={"stepping": {"microsteps": 64, "reference": MOVES}},
-        simulation={"duration": 2.2, "sample_interval": 1e-3},
+        simulation=run_of(2.2, 1e-3),
     )
     one, other = lm.sizing.open_loop(short), lm.sizing.open_loop(train())
     assert one.resonances == pytest.approx(other.resonances, rel=1e-9)

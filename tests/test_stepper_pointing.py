@@ -10,6 +10,7 @@ import lostmotion as lm
 from conftest import ROOT
 from lostmotion.data_sheets.records import find
 from refusals import refused
+from tables import gear_between, rated_gearbox, run_of, stepper
 
 ARCSEC = math.pi / 648_000.0
 STEPS, T_H, J, RATIO = 400, 0.44, 68e-7, 144.0
@@ -28,29 +29,10 @@ def mount(
     error = {"transmission_error": {"kind": "sine", "amplitude": worm, "order": 1}} if worm else {}
     return lm.Scenario(
         shafts={"motor": {"viscous_friction": 0.02}, "axis": {"inertia": 1e-3}},
-        motors={
-            "ra": {
-                "shaft": "motor",
-                "kind": "stepper",
-                "rotor_inertia": J,
-                "steps_per_revolution": STEPS,
-                "holding_torque": T_H,
-                "detent_torque": detent,
-            }
-        },
-        gears={
-            "worm": {
-                "input": "motor",
-                "output": "axis",
-                "ratio": RATIO,
-                "stiffness": {"kind": "linear", "stiffness": 2e4},
-                "mesh_damping": 20.0,
-                **error,
-                **gear,
-            }
-        },
+        motors={"ra": stepper(J, STEPS, T_H, "motor", detent_torque=detent)},
+        gears={"worm": gear_between("motor", "axis", RATIO, 2e4, mesh_damping=20.0, **error, **gear)},
         command={"ra": {"stepping": {"microsteps": microsteps, "table_error": table_error, "reference": reference(duration)}}},
-        simulation={"duration": duration, "sample_interval": 1e-3},
+        simulation=run_of(duration, 1e-3),
     )
 
 
@@ -99,19 +81,10 @@ def test_the_short_form_and_the_axis_have_the_same_lines_as_the_train():
     motor = {"kind": "stepper", "rotor_inertia": J, "steps_per_revolution": STEPS, "holding_torque": T_H}
     short = lm.Scenario(
         motor=motor,
-        gearbox={
-            "ratio": RATIO,
-            "inertia": 0.0,
-            "viscous_friction": 0.02,
-            "rated_output_torque": 10.0,
-            "rated_input_speed": 100.0,
-            "stiffness": {"kind": "linear", "stiffness": 2e4},
-            "mesh_damping": 20.0,
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        gearbox=rated_gearbox(RATIO, 100.0, 10.0, 2e4, 1.0, inertia=0.0, viscous_friction=0.02, mesh_damping=20.0),
         load={"inertia": 1e-3},
         command={"stepping": {"microsteps": 4, "reference": reference(5.0)}},
-        simulation={"duration": 5.0, "sample_interval": 1e-3},
+        simulation=run_of(5.0, 1e-3),
     )
     axis = lm.Scenario(
         axis={

@@ -11,6 +11,7 @@ from conftest import ROOT
 from lostmotion.model.synchronous_motor import Winding
 from lostmotion.studies.runs.read_table import read_table
 from refusals import refused
+from tables import rated_gearbox, run_of
 
 RPM = math.pi / 30.0
 
@@ -32,15 +33,9 @@ def axis(m: lm.Motor, command, load_inertia: float = 0.5, torque=0.0, duration: 
     return lm.Scenario(
         command=command,
         motor=m,
-        gearbox={
-            "ratio": 20.0,
-            "rated_input_speed": "3000 rpm",
-            "rated_output_torque": 80.0,
-            "stiffness": {"kind": "rigid"},
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        gearbox=rated_gearbox(20.0, "3000 rpm", 80.0, {"kind": "rigid"}, 1.0),
         load={"inertia": load_inertia, "torque": torque},
-        simulation={"duration": duration, "sample_interval": duration / 200.0},
+        simulation=run_of(duration, duration / 200.0),
     )
 
 

@@ -17,18 +17,12 @@ from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study_files import from_json, to_json
 from refusals import refused
+from tables import rated_gearbox
 
 LIMITS = {"continuous_torque": "5 N m", "peak_torque": "25 N m", "max_speed": "4000 rpm", "resistance": "1 ohm"}
 LIMITS |= {"torque_constant": "0.5 N m/A", "max_voltage": "400 V", "max_current": "60 A"}
 MOTOR: dict[str, Any] = {"kind": "torque_source", "rotor_inertia": "3e-4 kg m^2", "rated_torque": "5 N m", "limits": LIMITS}
-GEARBOX: dict[str, Any] = {
-    "ratio": 2,
-    "inertia": "4e-5 kg m^2",
-    "rated_input_speed": "3000 rpm",
-    "rated_output_torque": "20 N m",
-    "stiffness": {"kind": "rigid"},
-    "losses": {"kind": "constant_efficiency", "efficiency": 0.95},
-}
+GEARBOX: dict[str, Any] = rated_gearbox(2, "3000 rpm", "20 N m", {"kind": "rigid"}, 0.95, inertia="4e-5 kg m^2")
 MOVES = {"kind": "position", "speed": "200 mm/s", "acceleration": "2 m/s^2", "jerk": "100 m/s^3"}
 SLIDE: dict[str, Any] = {
     "task": {"cycle": "2 s", "hold_without_power": False},

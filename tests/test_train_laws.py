@@ -12,6 +12,7 @@ import lostmotion as lm
 from lostmotion.simulation.runs import core_runs
 from lostmotion.simulation.runs.separate_trains import parts_of
 from refusals import refusals_of, refused, refuses
+from tables import gear_between, linked, rated_gearbox, run_of, torque_source
 from test_c_interface import OK, library  # noqa: F401
 from test_description import Scenario
 from test_drive_train import train
@@ -45,22 +46,21 @@ ELEMENTS = {
         command={"k": {"steps": [{"height": 1.0, "time": 0.2}, {"height": -1.0, "time": 0.4}]}},
     ),
     "clutch": two_shafts(
-        clutches={"c": {"input": "a", "output": "b", "torque": 0.6}},
-        command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}},
+        clutches={"c": linked("a", "b", torque=0.6)}, command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}}
     ),
-    "safety clutch": two_shafts(clutches={"c": {"kind": "safety", "input": "a", "output": "b", "torque": 0.6}}),
-    "freewheel": two_shafts(freewheels={"f": {"input": "a", "output": "b"}}),
-    "damper": two_shafts(dampers={"d": {"input": "a", "output": "b", "viscous_friction": 5e-3}}),
+    "safety clutch": two_shafts(clutches={"c": linked("a", "b", kind="safety", torque=0.6)}),
+    "freewheel": two_shafts(freewheels={"f": linked("a", "b")}),
+    "damper": two_shafts(dampers={"d": linked("a", "b", viscous_friction=5e-3)}),
     "fluid coupling": two_shafts(
-        dampers={"d": {"input": "a", "output": "b", "drag": FLUID}}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "friction_torque": 0.05}}
+        dampers={"d": linked("a", "b", drag=FLUID)}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "friction_torque": 0.05}}
     ),
     "damper beside a clutch": two_shafts(
-        clutches={"c": {"input": "a", "output": "b", "torque": 0.3}},
-        dampers={"d": {"input": "b", "output": "a", "viscous_friction": 2e-3, "drag": FLUID}},
+        clutches={"c": linked("a", "b", torque=0.3)},
+        dampers={"d": linked("b", "a", viscous_friction=2e-3, drag=FLUID)},
         command={"c": {"ramps": [{"rise": 1.0, "duration": 0.3, "begin": 0.1}]}},
     ),
     "vibration damper": two_shafts(
-        gears={"g": SOFT}, shafts={"ring": {"inertia": 1e-3}}, dampers={"d": {"input": "b", "output": "ring", "viscous_friction": 5e-3}}
+        gears={"g": SOFT}, shafts={"ring": {"inertia": 1e-3}}, dampers={"d": linked("b", "ring", viscous_friction=5e-3)}
     ),
     "gravity": two_shafts(gears={"g": SOFT}, gravity={"arm": {"shaft": "b", "mass": 0.5, "radius": 0.2}}),
     "cogging": two_shafts(
@@ -79,10 +79,7 @@ ELEMENTS = {
         shafts={"a": {"inertia": 1e-3, "friction_torque": 0.02}},
     ),
     "housing": two_shafts(
-        gears={
-            "g": SOFT | {"housing": "h", "stiffness": GAP, "mesh_damping": 0.01},
-            "support": SOFT | {"input": "h", "output": "b", "ratio": 1.5},
-        },
+        gears={"g": SOFT | {"housing": "h", "stiffness": GAP, "mesh_damping": 0.01}, "support": SOFT | gear_between("h", "b", 1.5)},
         shafts={"h": {"inertia": 4e-3, "friction_torque": 0.02}},
     ),
     "planetary gear": two_shafts(
@@ -92,9 +89,7 @@ ELEMENTS = {
     "drag": two_shafts(gears={"g": STIFF}, shafts={"b": {"inertia": 2e-3, "torque": 0.0, "drag": FAN}}),
     "damped play": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2}}),
     "limited damping": two_shafts(gears={"g": SOFT | {"stiffness": GAP, "mesh_damping": 0.2, "damping_limited": True}}),
-    "torque limit": two_shafts(
-        gears={"g": STIFF}, motors={"m": {"shaft": "a", "kind": "torque_source", "rotor_inertia": 1e-4, "torque_limit": 0.5}}
-    ),
+    "torque limit": two_shafts(gears={"g": STIFF}, motors={"m": torque_source(1e-4, "a", torque_limit=0.5)}),
     "worm and brake": train(),
 }
 
@@ -556,17 +551,11 @@ def test_an_arm_on_a_spring_swings_by_half_periods_of_both_directions(solver: st
 def test_the_twist_of_a_gearbox_swings_by_half_periods_in_the_short_form() -> None:
     rotor, ratio, load = 2e-4, 50.0, 0.75
     scenario = lm.Scenario(
-        motor={"kind": "torque_source", "rotor_inertia": rotor, "rated_torque": 1.0},
-        gearbox={
-            "ratio": ratio,
-            "rated_input_speed": 300.0,
-            "rated_output_torque": 50.0,
-            "stiffness": {"kind": "curve", "slopes": [K], "backward": BACKWARD},
-            "losses": {"kind": "constant_efficiency", "efficiency": 1.0},
-        },
+        motor=torque_source(rotor, rated_torque=1.0),
+        gearbox=rated_gearbox(ratio, 300.0, 50.0, {"kind": "curve", "slopes": [K], "backward": BACKWARD}, 1.0),
         load={"inertia": load},
         initial={"twist": 0.01},
-        simulation={"duration": 1.0, "sample_interval": 0.002},
+        simulation=run_of(1.0, 0.002),
     )
     own = 1.0 / (1.0 / load + 1.0 / (rotor * ratio**2))
     stretched = math.sqrt(J / own)

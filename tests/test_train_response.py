@@ -11,6 +11,7 @@ from typer.testing import CliRunner
 import lostmotion as lm
 from lostmotion.cli import app
 from refusals import refused
+from tables import gear_between, torque_source
 
 RUN = {"duration": 1.0, "sample_interval": 1e-3}
 ROTOR = 1e-9  # [kg m2]
@@ -22,17 +23,10 @@ TWO_STAGES: dict[str, Any] = {
         "middle": {"inertia": 2e-4, "friction_torque": 0.03, "viscous_friction": 1e-3},
         "table": {"inertia": 0.5, "friction_torque": 6.0, "viscous_friction": 0.05, "torque": {"mean": 0.7}},
     },
-    "motors": {"m": {"shaft": "motor", "kind": "torque_source", "rotor_inertia": 1e-4, "rated_torque": 1.0}},
+    "motors": {"m": torque_source(1e-4, "motor", rated_torque=1.0)},
     "gears": {
-        "belt": {"input": "motor", "output": "middle", "ratio": 2.0, "stiffness": {"kind": "curve", "slopes": [40.0], "backlash": 4e-3}},
-        "gearbox": {
-            "input": "middle",
-            "output": "table",
-            "ratio": 30.0,
-            "rated_output_torque": 50.0,
-            "stiffness": {"kind": "linear", "stiffness": 2e4},
-            "hysteresis": {"efficiency": 0.9},
-        },
+        "belt": gear_between("motor", "middle", 2.0, {"kind": "curve", "slopes": [40.0], "backlash": 4e-3}),
+        "gearbox": gear_between("middle", "table", 30.0, 2e4, rated_output_torque=50.0, hysteresis={"efficiency": 0.9}),
     },
     "command": {"m": {"amplitude": 0.2, "frequency": 1.0}},
     "simulation": RUN,
@@ -75,10 +69,7 @@ def test_a_chain_of_four_masses_follows_its_transfer_function_over_four_decades(
     stiffness, ratios = [30.0, 200.0, 80.0], [1.0, 2.0, 0.5]
     shafts = {f"s{k}": {"inertia": J, "viscous_friction": b} for k, (J, b) in enumerate(zip(inertias, friction, strict=True))}
     shafts["s3"]["torque"] = {"mean": 0.0}  # type: ignore[assignment]
-    gears = {
-        f"g{k}": {"input": f"s{k}", "output": f"s{k + 1}", "ratio": i, "stiffness": {"kind": "linear", "stiffness": c}}
-        for k, (c, i) in enumerate(zip(stiffness, ratios, strict=True))
-    }
+    gears = {f"g{k}": gear_between(f"s{k}", f"s{k + 1}", i, c) for k, (c, i) in enumerate(zip(stiffness, ratios, strict=True))}
     motors = {"m": {"shaft": "s0", "kind": "torque_source", "rotor_inertia": 1e-5, "rated_torque": 0.5}}
     chain = lm.Scenario(shafts=shafts, motors=motors, gears=gears, simulation=RUN)
     frequencies = np.geomspace(0.05, 500.0, 25)
