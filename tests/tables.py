@@ -2,6 +2,18 @@
 
 from typing import Any
 
+MOTOR = """
+[motor]
+rotor_inertia = 8e-6
+friction_torque = 0.016
+rated_torque = 0.521
+rated_speed = "3300 rpm"
+rated_voltage = 24
+electrical_time_constant = "0.1286 ms"
+armature_voltage_constant = 3.1169
+"""
+"""The motor of the paper, as files write it."""
+
 
 def linear(stiffness: Any, **more: Any) -> dict[str, Any]:
     return {"kind": "linear", "stiffness": stiffness, **more}

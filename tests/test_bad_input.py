@@ -18,20 +18,14 @@ from lostmotion.inputs.refusal_messages import listed, nearest
 from lostmotion.studies.expressions.expressions import Expression
 from lostmotion.studies.expressions.vocabulary import vocabulary_of
 from refusals import assert_file_refused, assert_plain, refusals_of, refused
+from tables import MOTOR
 
-GOOD = """
+GOOD = (
+    MOTOR
+    + """
 [command]
 amplitude = 1.0
 frequency = 1.0
-
-[motor]
-rotor_inertia = 8e-6
-friction_torque = 0.016
-rated_torque = 0.521
-rated_speed = "3300 rpm"
-rated_voltage = 24
-electrical_time_constant = "0.1286 ms"
-armature_voltage_constant = 3.1169
 
 [gearbox]
 ratio = 90
@@ -62,6 +56,7 @@ torque = 0.0
 duration = 0.01
 sample_interval = 0.001
 """
+)
 
 # (what is wrong, text to replace, its replacement, words that the message must contain)
 BROKEN = [

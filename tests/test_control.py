@@ -9,6 +9,7 @@ from scipy.linalg import expm
 
 import lostmotion as lm
 from refusals import assert_file_refused, refused
+from tables import MOTOR
 from two_mass import A, B, T, two_mass
 
 
@@ -183,16 +184,9 @@ def test_what_a_law_raises_comes_through() -> None:
 # --- A controller that cannot be used is refused in one line that names the key and the remedy ---
 
 
-AXIS = """
-[motor]
-rotor_inertia = 8e-6
-friction_torque = 0.016
-rated_torque = 0.521
-rated_speed = "3300 rpm"
-rated_voltage = 24
-electrical_time_constant = "0.1286 ms"
-armature_voltage_constant = 3.1169
-
+AXIS = (
+    MOTOR
+    + """
 [gearbox]
 ratio = 90
 rated_input_speed = "3630 rpm"
@@ -215,6 +209,7 @@ current = { kind = "pi" }
 duration = "10 ms"
 sample_interval = "1 ms"
 """
+)
 
 ENCODER, POSITION, SPEED = (
     "encoder = { lines = 2048 }", 'position = { gain = "10 1/s", sample_time = "1 ms" }',

@@ -331,20 +331,6 @@ def test_shipped_trains_run_and_their_energy_balance_closes(path: Path) -> None:
             assert np.allclose(twist, result[f"{name}_twist"], atol=1e-9 * size)
 
 
-@pytest.mark.parametrize("ending", [".nc", ".csv", ".parquet"])
-def test_a_saved_result_of_a_train_is_read_back_and_run_again(tmp_path: Path, ending: str) -> None:
-    result = lm.simulate(train(), energy=True)
-    path = tmp_path / f"run{ending}"
-    lm.save(result, path)
-    back = lm.open_result(path)
-    assert back.identical(result)
-    assert lm.switchings_of(back).identical(lm.switchings_of(result))
-    assert lm.simulation.scenario_of(back) == train()
-    assert lm.simulate(lm.load(path), energy=True).identical(result)
-    halved = lm.load(path, ["gears.belt.ratio=1"])
-    assert halved.gears["belt"].ratio == 1.0
-
-
 def test_losses_of_a_gear_on_a_turning_housing_are_apart_from_those_of_a_shaft_of_its_name() -> None:
     scenario = lm.Scenario(
         shafts={"a": {"inertia": 0.1, "viscous_friction": 0.5}, "b": {"inertia": 0.2}, "r": {"inertia": 0.3}},

@@ -9,7 +9,7 @@ from scipy.integrate import solve_ivp
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.control.command import CommandSignal, Stepping
-from refusals import refused
+from refusals import refusals_of, refused
 from stepper_axes import departure
 
 J, T_H, N = 5e-6, 0.3, 50
@@ -123,21 +123,16 @@ def test_microsteps_have_the_error_of_the_table() -> None:
     assert stepping.table(counts) == pytest.approx([0.25 + 0.1, 0.5, 0.75 - 0.1, 0.5], abs=1e-15)
 
 
-@pytest.mark.parametrize(
-    ("change", "text"),
-    [
-        ({"steps_per_revolution": 202}, "multiple of 4"),
-        ({"holding_torque": None}, "lacks holding_torque"),
-        ({"torque_error": 1e-12}, "2e-08 to 0.05 of its holding_torque"),
-        ({"torque_error": T_H}, "2e-08 to 0.05 of its holding_torque"),
-        ({"detent_torque": 1.1 * T_H}, "below its holding_torque"),
-        ({"rated_torque": 2.0}, "of no use to a stepper; give holding_torque"),
-        ({"voltage_limit": 3.0, "rated_voltage": 3.0}, "of no use to a stepper"),
-    ],
+test_a_stepper_that_makes_no_sense_is_refused = refusals_of(
+    lambda change: lm.Motor(**{key: value for key, value in {**MOTOR, **change}.items() if value is not None}),
+    ({"steps_per_revolution": 202}, ": multiple of 4"),
+    ({"holding_torque": None}, ": lacks holding_torque"),
+    ({"torque_error": 1e-12}, ": 2e-08 to 0.05 of its holding_torque"),
+    ({"torque_error": T_H}, ": 2e-08 to 0.05 of its holding_torque"),
+    ({"detent_torque": 1.1 * T_H}, ": below its holding_torque"),
+    ({"rated_torque": 2.0}, ": of no use to a stepper; give holding_torque"),
+    ({"voltage_limit": 3.0, "rated_voltage": 3.0}, ": of no use to a stepper"),
 )
-def test_a_stepper_that_makes_no_sense_is_refused(change: dict, text: str) -> None:
-    given = {key: value for key, value in {**MOTOR, **change}.items() if value is not None}
-    refused(lambda: lm.Motor(**given), match=text)
 
 
 def test_what_turns_a_stepper_otherwise_is_refused() -> None:

@@ -47,34 +47,23 @@ def line(found: lm.response.Spectrum, cause: str):
     return next(one for one in found.lines if cause in one.cause)
 
 
-def test_the_error_of_the_worm_is_a_line_of_its_amplitude_at_the_order_of_its_turns():
-    found = lm.spectrum(mount(worm=10.0 * ARCSEC))
-    worm = line(found, "transmission error of worm")
-    assert worm.order == pytest.approx(1.0, rel=1e-9)
-    assert worm.orders["axis"] == pytest.approx(RATIO, rel=1e-9)
-    assert worm.amplitude == pytest.approx(10.0 * ARCSEC, rel=2e-3)
+# The first harmonic of a sawtooth of the height q is q/pi; a sine that is held over sixteenths of its period has sinc(1/16) of its
+# amplitude; T_D sin(4 n phi) bends the field by T_D/(n T_H), at full steps and slow speed.
+LINES = {
+    "transmission error of worm": ({"worm": 10.0 * ARCSEC}, 1.0, 10.0 * ARCSEC, 2e-3),
+    "microsteps of ra": ({"microsteps": 4}, 4 * STEPS, FULL_STEP / 4 / RATIO / math.pi * carried(4 * STEPS), 0.02),
+    "sine table": ({"table_error": 0.05}, STEPS, 0.05 * FULL_STEP / RATIO * carried(STEPS) * float(np.sinc(1.0 / 16.0)), 0.01),
+    "detents": ({"detent": 0.02 * T_H}, STEPS, 0.02 / (STEPS / 4) / RATIO, 0.1),
+}
 
 
-def test_microsteps_are_a_sawtooth_at_their_order():
-    """The first harmonic of a sawtooth of the height q is q/pi."""
-    found = line(lm.spectrum(mount(microsteps=4)), "microsteps of ra")
-    assert found.order == pytest.approx(4 * STEPS, rel=1e-9)
-    assert found.amplitude == pytest.approx(FULL_STEP / 4 / RATIO / math.pi * carried(4 * STEPS), rel=0.02)
-
-
-def test_the_error_of_a_sine_table_is_a_line_at_the_order_of_full_steps():
-    """A sine that is held over sixteenths of its period has sinc(1/16) of its amplitude."""
-    found = line(lm.spectrum(mount(microsteps=16, table_error=0.05)), "sine table")
-    assert found.order == pytest.approx(STEPS, rel=1e-9)
-    expected = 0.05 * FULL_STEP / RATIO * carried(STEPS) * float(np.sinc(1.0 / 16.0))
-    assert found.amplitude == pytest.approx(expected, rel=0.01)
-
-
-def test_detents_are_a_line_at_the_order_of_full_steps():
-    """T_D sin(4 n phi) bends the field by T_D/(n T_H), at full steps and slow speed."""
-    found = line(lm.spectrum(mount(microsteps=16, detent=0.02 * T_H)), "detents")
-    assert found.order == pytest.approx(STEPS, rel=1e-9)
-    assert found.amplitude == pytest.approx(0.02 / (STEPS / 4) / RATIO, rel=0.1)
+@pytest.mark.parametrize("cause", LINES)
+def test_each_cause_is_a_line_of_its_amplitude_at_its_order(cause: str):
+    made, order, amplitude, rel = LINES[cause]
+    found = line(lm.spectrum(mount(**made)), cause)
+    assert found.order == pytest.approx(order, rel=1e-9)
+    assert found.amplitude == pytest.approx(amplitude, rel=rel)
+    assert cause != "transmission error of worm" or found.orders["axis"] == pytest.approx(RATIO, rel=1e-9)
 
 
 def test_the_short_form_and_the_axis_have_the_same_lines_as_the_train():
