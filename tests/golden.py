@@ -151,9 +151,7 @@ def of_study(scenario: lm.Scenario) -> Values:
     return {name: table[name].to_numpy().astype(float) for name in (*study.keep, "switchings")}
 
 
-# --- the file ----------------------------------------------------------------------------------------------
-
-
+# --- the file ---
 def bits_of(value: Any) -> np.ndarray:
     """The numbers of a value as they are hashed; one NaN is like another."""
     numbers = np.array(value, dtype="<f8").ravel()
@@ -185,9 +183,7 @@ def recorded() -> Groups:
     return {f"{name}.{what}": values for name, of in nested.items() for what, values in of.items()}
 
 
-# --- comparing ---------------------------------------------------------------------------------------------
-
-
+# --- comparing ---
 def flat(groups: Groups) -> Values:
     return {f"{group}.{name}": value for group, values in groups.items() for name, value in values.items()}
 

@@ -53,8 +53,6 @@ def robot(step: float, one: lm.Drive, **options: Any) -> Any:
 
 
 # --- equations of the arm, written here ---
-
-
 def inertia_and_bias(q: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """M(q), and Coriolis and gravity torques of the arm of ARM."""
     m1, l1, c1, i1, m2, c2, i2, g = 3.0, 0.5, 0.25, 0.06, 2.0, 0.2, 0.03, 9.81

@@ -49,8 +49,6 @@ def task(**changes: Any) -> dict[str, Any]:
 
 
 # --- actuators ---
-
-
 def test_an_actuator_is_judged_at_its_output():
     """RMD-X8V2: 9 : 1, 9 N m, 215 rpm, 2.6 kg cm2. The efficiency of a planetary stage, 0.97, is on both sides."""
     found = rules(task_of(ARM))
@@ -105,8 +103,6 @@ def test_other_threads_may_add_parts_while_the_range_of_losses_is_judged():
 
 
 # --- brakes ---
-
-
 def test_the_brake_of_the_motor():
     """SGM7A-15A: 7.84 N m, 2.5e-5 kg m2; the SGMSH-10AA has none in the catalogue."""
     study = task_of({**task(brake="of the motor"), **JOINT})
@@ -157,8 +153,6 @@ def test_the_drive_check_of_an_axis_names_the_keys_of_its_file():
 
 
 # --- amplifiers ---
-
-
 def test_the_rules_of_an_amplifier_by_hand():
     """6 A for 0.5 s over the end of the cycle, 1 A for 1.5 s: rms of sqrt((18 + 1.5)/2), above 3 A for 0.5 s."""
     time = np.array([0.0, 0.2, 0.2, 1.7, 1.7, 2.0])
@@ -195,8 +189,6 @@ def test_the_peak_current_of_the_amplifier_limits_the_loops():
 
 
 # --- the catalogue ---
-
-
 def test_the_catalogue_lists_and_filters_them():
     records = lm.catalogue()
     of = {kind: [r for r in records if isinstance(r, sheet)] for kind, sheet in (("actuator", lm.data_sheets.ActuatorSheet), ("brake", lm.data_sheets.BrakeSheet), ("amplifier", lm.data_sheets.AmplifierSheet))}  # fmt: skip

@@ -84,8 +84,6 @@ def test_a_measured_motion_comes_from_a_file(tmp_path, slides: bool):
 
 
 # --- demands by hand ---
-
-
 def test_gravity_of_an_arm():
     """Hanging at 0, so that 2 kg at 0.5 m pull with m g r sin(1.2) at the end of the move, and nothing at its start."""
     motion = motion_of(Duty(gravity=ArmGravity(mass=2.0, radius=0.5)))
@@ -193,8 +191,6 @@ def test_forces_on_the_output_bearing():
 
 
 # --- runs ---
-
-
 def test_a_run_has_the_gravity_of_the_long_form():
     """Gravity along the reference in the short form, and over the angle of the shaft in the long one, under the same controller."""
     task = task_of(ARM)

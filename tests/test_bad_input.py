@@ -409,9 +409,7 @@ def test_a_jamming_gear_is_refused_with_the_advice_to_give_it_a_compliance(tmp_p
     refused(lambda: lm.load(path), match=r"the drive has no inertia on the input shaft; give")
 
 
-# --- the command line --------------------------------------------------------------------------------------
-
-
+# --- the command line ---
 CALLS = [
     ("a file that is not there", ["run", "nothing.toml"], ["nothing.toml", "no such file"]),
     ("a file with a near name", ["run", "goood.toml"], ["did you mean good.toml"]),

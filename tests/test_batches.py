@@ -433,18 +433,15 @@ AXIS = {
 }
 
 
-@pytest.mark.parametrize(
-    ("scenario", "key"),
-    [
-        (lm.load("two-motors-one-ring"), "shafts.ring.inertia"),
-        (lm.load("worm-lowering"), "shafts.drum.inertia"),
-        (lm.load("two-link-arm-frozen"), "mass_matrices.arm.matrix.0.0"),
-        (lm.load("direction-finder"), "shafts.traverse.inertia"),
-        (lm.load("hunting-with-static-friction"), "shafts.table.inertia"),
-        (lm.Scenario(**AXIS), "axis.slide.mass"),
-        (lm.load("lossy-rigid-gear").replace(**{"gearbox.mesh_damping": 0.0}), "gearbox.ratio"),
-    ],
-)
+@pytest.mark.parametrize(("scenario", "key"), [
+    (lm.load("two-motors-one-ring"), "shafts.ring.inertia"),
+    (lm.load("worm-lowering"), "shafts.drum.inertia"),
+    (lm.load("two-link-arm-frozen"), "mass_matrices.arm.matrix.0.0"),
+    (lm.load("direction-finder"), "shafts.traverse.inertia"),
+    (lm.load("hunting-with-static-friction"), "shafts.table.inertia"),
+    (lm.Scenario(**AXIS), "axis.slide.mass"),
+    (lm.load("lossy-rigid-gear").replace(**{"gearbox.mesh_damping": 0.0}), "gearbox.ratio"),
+])  # fmt: skip
 def test_trains_of_any_kind_move_as_alone(scenario: lm.Scenario, key: str) -> None:
     value = lm.simulation.runs.sensitivities.value_at(scenario, key)
     values = np.array([1.0, 1.2]) * value
@@ -522,19 +519,15 @@ def test_a_drive_that_cannot_go_on_stays_and_is_named() -> None:
 
 
 # --- sensitivities ---
-
 MOVED = ("motor_speed", "load_speed", "twist", "load_angle")
 
 
-@pytest.mark.parametrize(
-    ("name", "keys"),
-    [
-        ("paper-2dof-nl-small", ["load.inertia", "gearbox.ratio", "motor.friction_torque", "gearbox.hysteresis.efficiency"]),
-        ("catalogue-robot-joint", ["load.inertia", "load.friction_torque", "gearbox.ratio", "motor.rated_torque"]),
-        ("backlash-reversing-load", ["gearbox.stiffness.backlash", "load.inertia", "motor.rotor_inertia"]),
-        ("step-to-standstill", ["load.friction_torque", "motor.rated_speed", "gearbox.rated_output_torque"]),
-    ],
-)
+@pytest.mark.parametrize(("name", "keys"), [
+    ("paper-2dof-nl-small", ["load.inertia", "gearbox.ratio", "motor.friction_torque", "gearbox.hysteresis.efficiency"]),
+    ("catalogue-robot-joint", ["load.inertia", "load.friction_torque", "gearbox.ratio", "motor.rated_torque"]),
+    ("backlash-reversing-load", ["gearbox.stiffness.backlash", "load.inertia", "motor.rotor_inertia"]),
+    ("step-to-standstill", ["load.friction_torque", "motor.rated_speed", "gearbox.rated_output_torque"]),
+])  # fmt: skip
 def test_sensitivities_are_those_of_a_run(name: str, keys: list[str]) -> None:
     """The run integrates the variational equations of the train, with the derivative of the reset at each switching."""
     drive, pause, count = lm.load(name).drive(), 5e-3, 20
@@ -576,8 +569,6 @@ def test_a_sensitivity_has_a_closed_form_and_follows_what_is_written() -> None:
 
 
 # --- controllers and given motions ---
-
-
 def positioned(generator: np.random.Generator) -> lm.Drive:
     """A drive of random parameters that the controller of a shipped scenario can hold."""
     drive = lm.load("position-axis").drive()

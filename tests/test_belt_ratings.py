@@ -172,8 +172,6 @@ def test_a_width_that_no_sheet_has_names_those_that_are():
 
 
 # --- whether currents are effective values or amplitudes ---
-
-
 GAIN = 0.48  # N·m/(rad/s), of scenarios/field-weakening.toml
 RMS = 0.88  # N·m to one ampere rms, printed for its motor: 1FT7044-.AK7, (3/sqrt 2) p psi
 

@@ -187,18 +187,15 @@ def test_a_record_by_name_with_overrides_and_by_file(tmp_path: Path):
     assert lm.load(child, ["gearbox.from=paper-gearbox"]).gearbox == lm.gearbox("paper-gearbox")
 
 
-@pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        ('gearbox = "no-such"', "not in the catalogue"),
-        ("[gearbox]\nfrom = 3", "must be the name of a record"),
-        ('[gearbox]\nfrom = "paper-gearbox"\ntemperatur = 3', "temperatur"),
-        ('[gearbox]\nfrom = "paper-gearbox"\nloss_factor = -1', "loss_factor"),
-        ('[gearbox]\nfrom = "paper-gearbox"\ntemperature = "60 degC"', "leave temperature out"),
-        ('[gearbox]\nfrom = "nord-sk1si50-60"', "lacks inertia"),
-        ('[gearbox]\nfrom = "none.toml"', "no such file"),
-    ],
-)
+@pytest.mark.parametrize(("text", "match"), [
+    ('gearbox = "no-such"', "not in the catalogue"),
+    ("[gearbox]\nfrom = 3", "must be the name of a record"),
+    ('[gearbox]\nfrom = "paper-gearbox"\ntemperatur = 3', "temperatur"),
+    ('[gearbox]\nfrom = "paper-gearbox"\nloss_factor = -1', "loss_factor"),
+    ('[gearbox]\nfrom = "paper-gearbox"\ntemperature = "60 degC"', "leave temperature out"),
+    ('[gearbox]\nfrom = "nord-sk1si50-60"', "lacks inertia"),
+    ('[gearbox]\nfrom = "none.toml"', "no such file"),
+])  # fmt: skip
 def test_bad_use_of_a_record_names_file_and_remedy(tmp_path: Path, text: str, match: str):
     path = scenario_with(tmp_path, text)
     assert refused(lambda: lm.load(path), match=match).startswith(str(path))
@@ -229,8 +226,6 @@ def test_command_line(tmp_path: Path):
 
 
 # --- changes to what the catalogue has ---
-
-
 def own_sheet(tmp_path: Path, **changes) -> str:
     """A sheet file of one's own, with a printed width of the torsion loop."""
     record = sheet(name="own", backlash="1 arcmin", hysteresis_loss="2 arcmin", **changes)
@@ -315,21 +310,18 @@ def test_added_backlash_adds_to_a_changed_curve_too(tmp_path: Path):
     assert both.gearbox.stiffness.backlash == pytest.approx(4 * ARCMIN)
 
 
-@pytest.mark.parametrize(
-    ("overrides", "match"),
-    [
-        (["gearbox.losses.efficiency=0.9", "gearbox.loss_factor=2"], "gearbox.loss_factor: acts on the record's own losses"),
-        (['gearbox.losses={kind="constant_efficiency",efficiency=0.9}', "gearbox.temperature=40"], "gearbox.temperature: acts"),
-        (['gearbox.stiffness={kind="linear",stiffness=1e4}', "gearbox.added_backlash=1e-3"], "needs a torsion curve"),
-        (["gearbox.stiffness.slopes=[1e4]"], "gearbox.stiffness: has 1 slopes and 2 breaks"),
-        (["gearbox.stiffness.slops=[1e4]"], "gearbox.stiffness.slops: is not known; did you mean slopes"),
-        (["gearbox.stiffness=5"], "gearbox.stiffness: 5 must be a table"),
-        (["gearbox.losfactor=2"], "gearbox.losfactor: is not known; did you mean loss_factor"),
-        (["gearbox.inertia=1,2 kgcm2"], 'has a decimal comma; write "1.2 kgcm2"'),
-        (["gearbox=maxon-ec-i-52-606793"], "is a motor; a gearbox is wanted here"),
-        (["motor=schaeffler-rt1-h-20-100"], "is a gearbox; a motor is wanted here"),
-    ],
-)
+@pytest.mark.parametrize(("overrides", "match"), [
+    (["gearbox.losses.efficiency=0.9", "gearbox.loss_factor=2"], "gearbox.loss_factor: acts on the record's own losses"),
+    (['gearbox.losses={kind="constant_efficiency",efficiency=0.9}', "gearbox.temperature=40"], "gearbox.temperature: acts"),
+    (['gearbox.stiffness={kind="linear",stiffness=1e4}', "gearbox.added_backlash=1e-3"], "needs a torsion curve"),
+    (["gearbox.stiffness.slopes=[1e4]"], "gearbox.stiffness: has 1 slopes and 2 breaks"),
+    (["gearbox.stiffness.slops=[1e4]"], "gearbox.stiffness.slops: is not known; did you mean slopes"),
+    (["gearbox.stiffness=5"], "gearbox.stiffness: 5 must be a table"),
+    (["gearbox.losfactor=2"], "gearbox.losfactor: is not known; did you mean loss_factor"),
+    (["gearbox.inertia=1,2 kgcm2"], 'has a decimal comma; write "1.2 kgcm2"'),
+    (["gearbox=maxon-ec-i-52-606793"], "is a motor; a gearbox is wanted here"),
+    (["motor=schaeffler-rt1-h-20-100"], "is a gearbox; a motor is wanted here"),
+])  # fmt: skip
 def test_a_change_without_effect_or_sense_is_refused(tmp_path: Path, overrides: list[str], match: str):
     path = scenario_with(tmp_path, f'[gearbox]\nfrom = "{own_sheet(tmp_path)}"')
     assert refused(lambda: lm.load(path, overrides), match=match).startswith(str(path))
@@ -396,8 +388,6 @@ def test_a_reversed_range_is_told_as_such():
 
 
 # --- notes of parts after an override ---
-
-
 MAP = {"kind": "map", "speeds": [0.0, 1.0], "loads": [0.0, 1.0], "values": [[0.01, 0.02], [0.03, 0.05]], "mirrored": True}
 
 
@@ -496,8 +486,6 @@ def test_what_is_said_of_a_friction_that_is_not_printed_goes_when_it_is_given() 
 
 
 # --- titles ---
-
-
 def test_a_title_names_the_values_that_were_changed_below_it(tmp_path: Path) -> None:
     """The joint of the title swings at 1 Hz, the changed one at 2 Hz."""
     plain = lm.load("catalogue-robot-joint").title
@@ -514,8 +502,6 @@ def test_a_title_names_the_values_that_were_changed_below_it(tmp_path: Path) -> 
 
 
 # --- loss maps from data sheets ---
-
-
 def test_measured_nodes_carry_their_figure_and_their_origin():
     built = build_loss_map(sheet())
     speeds, loads, values = built.losses.whole()

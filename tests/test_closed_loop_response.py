@@ -36,16 +36,13 @@ def exact_loop(scenario: lm.Scenario, loop: str) -> LinearLoop:
 FREQUENCIES = [0.5, 3.0, 10.0, 33.0, 77.7, 190.0]
 
 
-@pytest.mark.parametrize(
-    ("kind", "changes"),
-    [
-        ("speed", {}),
-        ("speed", {"delay": 0}),
-        ("speed", {"encoder": {"ideal": True, "delay": 3}}),
-        ("position", {}),
-        ("position", {"blend_time": 5e-3}),
-    ],
-)
+@pytest.mark.parametrize(("kind", "changes"), [
+    ("speed", {}),
+    ("speed", {"delay": 0}),
+    ("speed", {"encoder": {"ideal": True, "delay": 3}}),
+    ("position", {}),
+    ("position", {"blend_time": 5e-3}),
+])  # fmt: skip
 def test_a_linear_loop_has_the_response_of_its_matrices(kind: str, changes: dict[str, Any]) -> None:
     """The transfer function in z at the samples of the loop, from the matrix exponential of the plant and the controller's laws."""
     scenario = two_masses(kind, **changes)
@@ -82,8 +79,6 @@ def test_a_loop_of_the_speed_may_go_on_turning() -> None:
 
 
 # --- drives that are not linear, against long runs ---
-
-
 def axis(**changes: Any) -> lm.Scenario:
     scenario = lm.load("position-axis")
     assert isinstance(scenario, lm.Scenario)
@@ -145,8 +140,6 @@ def test_powers_are_those_of_the_energy_ledger() -> None:
 
 
 # --- periods and sample times ---
-
-
 def test_frequencies_that_do_not_fit_are_moved_to_the_nearest() -> None:
     """10 ms are 10 samples of 1 ms; three periods of 30 Hz are 100; pi Hz is not a ratio of whole numbers."""
     exact = [fitting(f, T, 8) for f in (0.01, 1.0, 10.0, 30.0, 125.0, 400.0)]

@@ -29,8 +29,6 @@ SMALL = "paper-2dof-nl-small"
 
 
 # --- scenarios by name, results as scenarios ---
-
-
 def test_shipped_scenarios_are_known_by_name(tmp_path: Path) -> None:
     assert list(lm.shipped_scenarios()) == [p.stem for p in ALL_SCENARIOS]
     for path in ALL_SCENARIOS:
@@ -105,8 +103,6 @@ def test_a_saved_result_is_run_again_as_it_was(tmp_path: Path, ending: str) -> N
 
 
 # --- the catalogue ---
-
-
 def test_the_catalogue_says_what_is_a_gearbox_a_motor_complete_or_not() -> None:
     lines = list_records().splitlines()
     assert lines[0].split()[:3] == ["name", "type", "kind"]
@@ -143,8 +139,6 @@ def test_the_template_of_a_motor_sheet_can_be_used_as_it_is(tmp_path: Path, kind
 
 
 # --- before the work ---
-
-
 def test_output_is_tried_before_the_work(tmp_path: Path) -> None:
     (tmp_path / "study.toml").write_text((ROOT / "examples" / "tolerance.toml").read_text().replace("../scenarios/", ""))
     (tmp_path / f"{SMALL}.toml").write_text(f'base = "{SMALL}"\n')
@@ -167,7 +161,6 @@ def test_output_is_tried_before_the_work(tmp_path: Path) -> None:
 
 
 # --- quick to start ---
-
 # An exit takes the worker threads along.
 STOPS_AT_THE_FIRST_COMPUTATION = """
 import lostmotion._core, lostmotion.simulation.scenario.scenario
@@ -282,8 +275,6 @@ def test_a_command_imports_what_it_needs_alone(tmp_path: Path) -> None:
 
 
 # --- help, version, completion, progress ---
-
-
 def test_short_help_version_and_completion() -> None:
     run = CliRunner().invoke
     for command in ([], ["run"], ["rig"], ["check"], ["drive", "check"], ["study"]):
@@ -296,15 +287,12 @@ def test_short_help_version_and_completion() -> None:
         assert f'kind = "{kind}"' in run(app, ["catalogue", "new", *options]).output
 
 
-@pytest.mark.parametrize(
-    ("typed", "expected"),
-    [
-        ("lostmotion run paper-2dof-nl-", ["paper-2dof-nl-large", "paper-2dof-nl-small"]),
-        ("lostmotion rig schaeffler-rt1-h-2", ["schaeffler-rt1-h-20-100", "schaeffler-rt1-h-25-100"]),
-        ("lostmotion run my", ["my-drive.toml"]),
-        ("lostmotion run /usr/li", ["/usr/lib/"]),
-    ],
-)
+@pytest.mark.parametrize(("typed", "expected"), [
+    ("lostmotion run paper-2dof-nl-", ["paper-2dof-nl-large", "paper-2dof-nl-small"]),
+    ("lostmotion rig schaeffler-rt1-h-2", ["schaeffler-rt1-h-20-100", "schaeffler-rt1-h-25-100"]),
+    ("lostmotion run my", ["my-drive.toml"]),
+    ("lostmotion run /usr/li", ["/usr/lib/"]),
+])  # fmt: skip
 def test_the_shell_completes_scenarios_gearboxes_and_files(tmp_path: Path, typed: str, expected: list[str]) -> None:
     (tmp_path / "my-drive.toml").touch()
     words = {"_LOSTMOTION_COMPLETE": "complete_bash", "COMP_WORDS": typed, "COMP_CWORD": str(len(typed.split()) - 1)}

@@ -106,7 +106,6 @@ def test_with_static_friction_it_hunts_in_proportion_to_the_excess() -> None:
 
 
 # --- linear, limited, random ---
-
 TWO_MASSES: dict[str, Any] = {
     "shafts": {"motor": {"inertia": 0.002, "viscous_friction": 0.01}, "load": {"inertia": 0.05, "viscous_friction": 0.02}},
     "gears": {
@@ -287,8 +286,6 @@ def test_linear_model_has_the_controller_inside() -> None:
 
 
 # --- limit cycles ---
-
-
 def test_limit_cycle_with_static_friction_is_that_of_the_closed_form() -> None:
     """State and period to rounding; its multiplier is the square of that of half a period, by symmetry."""
     for excess in (0.1, 0.2):
@@ -376,8 +373,6 @@ def test_limit_cycle_of_a_play_is_that_of_the_closed_form_and_the_published_one(
 
 
 # --- systems of other libraries, input that is refused, maps ---
-
-
 def test_systems_of_scipy_and_python_control_act_as_the_pid_that_they_equal() -> None:
     """6 + 9/s + 0.6 s/(1 + 0.02 s), as one transfer function, of the error."""
     import control
@@ -449,7 +444,6 @@ def test_the_period_is_the_shortest_one() -> None:
 
 
 # --- in the short form ---
-
 SHORT = """
 base = "paper-2dof-nl-small"
 
@@ -493,14 +487,11 @@ def test_in_the_short_form_it_makes_a_train_of_the_drive(tmp_path: Path) -> None
         assert np.array_equal(a[name], b[name]), name
 
 
-@pytest.mark.parametrize(
-    ("text", "message"),
-    [
-        (SHORT.replace('limit = "1 N*m"', "limit = -1"), r"short.toml: key controller.limit: "),
-        (SHORT.replace("[simulation]", "[command]\namplitude = 0.1\n[simulation]"), "keys command, controller: both turn the motor"),
-        (SHORT + '[task]\nambient_temperature = "30 degC"', "keys task, controller: "),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("text", "message"), [
+    (SHORT.replace('limit = "1 N*m"', "limit = -1"), r"short.toml: key controller.limit: "),
+    (SHORT.replace("[simulation]", "[command]\namplitude = 0.1\n[simulation]"), "keys command, controller: both turn the motor"),
+    (SHORT + '[task]\nambient_temperature = "30 degC"', "keys task, controller: "),
+])  # fmt: skip
 def test_what_is_wrong_in_the_short_form_has_its_key(tmp_path: Path, text: str, message: str) -> None:
     path = tmp_path / "short.toml"
     path.write_text(text)

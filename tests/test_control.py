@@ -22,8 +22,6 @@ def torque_source(**changes: Any) -> dict[str, Any]:
 
 
 # --- closed forms ---
-
-
 def test_the_current_loop_overshoots_by_one_part_in_27() -> None:
     """g/(z (z - 1)) with g = 1/3 closed: c[k+2] = c[k+1] - (c[k] - r)/3, whose largest value is 28/27."""
     axis = scenario(
@@ -104,8 +102,6 @@ def test_a_linear_two_mass_drive_under_a_sampled_pi_is_the_linear_recursion() ->
 
 
 # --- step by step ---
-
-
 @pytest.fixture
 def axis() -> lm.Scenario:
     s = lm.load("position-axis", {"simulation.duration": 0.4})
@@ -182,8 +178,6 @@ def test_what_a_law_raises_comes_through() -> None:
 
 
 # --- A controller that cannot be used is refused in one line that names the key and the remedy ---
-
-
 AXIS = (
     MOTOR
     + """

@@ -28,8 +28,6 @@ def motor_angle(x: np.ndarray) -> float:
 
 
 # --- what docs/control.md says of the blocks ---
-
-
 def read(angle: float, lines: int, error: float = 0.0, periods: int = 0, phase: float = 0.0) -> float:
     """q floor(angle/q + 1/2) + e sin(N angle + psi)"""
     q = 2.0 * math.pi / (4 * lines)
@@ -146,8 +144,6 @@ def agree(result: Any, states: np.ndarray, **signals: list[float]) -> None:
 
 
 # --- one block after the other ---
-
-
 def test_an_encoder_has_steps_an_error_and_a_delay() -> None:
     loop, estimate, late = SpeedLoop(0.05, 1.0), Difference(2, 1e-3), Late(2)
     shown: list[float] = []
@@ -342,7 +338,6 @@ def test_a_limit_of_the_voltage_does_not_wind_up_the_current_loop() -> None:
 
 
 # --- camera and tracker ---
-
 MASK = 2**32 - 1
 
 

@@ -10,7 +10,6 @@ from scipy.integrate import solve_ivp
 import lostmotion as lm
 
 # --- EMPS: Janot, Gautier, Brunot (2019), one linear axis ---
-
 EMPS = {"M": 95.1089, "F_v": 203.5034, "F_c": 20.3935, "offset": -3.1648, "g_tau": 35.15065, "k_p": 160.18, "k_v": 243.45}
 MOVES = {"kind": "position", "speed": 0.15, "acceleration": 1.5, "dwell": 0.25, "moves": [{"to": 0.2}, {"to": 0.0}]}
 VOLTS = 10.0
@@ -82,7 +81,6 @@ def test_the_emps_axis_in_closed_loop_is_that_of_its_closed_form() -> None:
 
 
 # --- Test rig of DTU and Siemens: Papageorgiou (2017), two motors on a shaft with backlash and static friction ---
-
 RIG = {"J": 8.31e-4, "K": 32.94, "D": 0.0548, "T_C": (0.0223, 0.0232), "T_S": (0.0441, 0.0453), "gap": 0.0016, "limit": 13.0}
 RIG_T, RIG_TICKS = 125e-6, 2000
 # Identical damping of both pole pairs of the two-mass drive, R = 1, with 0.4.
@@ -220,8 +218,6 @@ def test_the_rig_is_the_same_by_the_adaptive_solver() -> None:
 
 
 # --- motulator's two-mass example: its mechanics, its speed controller, its delay ---
-
-
 def test_two_masses_under_motulators_speed_controller_are_those_of_motulator() -> None:
     """Its equations and its controller as they are; its own integration (relative tolerance 1e-3) is replaced by a tight one."""
     pytest.importorskip("motulator")

@@ -118,7 +118,6 @@ def test_the_long_form_of_a_controlled_drive_moves_alike(axis: lm.Scenario) -> N
 
 
 # --- laws of one's own ---
-
 K, W, LIMIT = 8e-3, 120.0, 0.4  # N m s/rad, rad/s, N m
 
 
@@ -181,31 +180,26 @@ def failing(time: float, *_: Any) -> float:
     return 0.0
 
 
-@pytest.mark.parametrize(
-    ("law", "changes", "kind", "words"),
-    [
-        (failing, {"law": True}, KeyError, "of the law's own"),
-        (lambda *_: math.nan, {"law": True}, (lm.InputError, lm.SolverError), "number"),
-        (lambda *_: math.inf, {"law": True}, (lm.InputError, lm.SolverError), "number"),
-        (lambda *_: "0.3", {"law": True}, (lm.InputError, TypeError), "number"),
-        (lambda *_: None, {"law": True}, (lm.InputError, TypeError), "number"),
-        (lambda time: 0.0, {"law": True}, TypeError, "argument"),
-        (None, {"law": True}, lm.InputError, "(?=.*law).*m"),
-        (3.0, {"law": True}, lm.InputError, "(?=.*law).*function"),
-        ({"n": python_law}, {"law": True}, lm.InputError, "(?=.*law).*m"),
-        (python_law, {"speed": {"gain": K}}, lm.InputError, "law"),
-        (lm.control.Law(python_law, states=-1), {"law": True}, lm.InputError, "states"),
-        (lm.control.Law(python_law, data=np.zeros(2)), {"law": True}, lm.InputError, "data"),
-    ],
-)
+@pytest.mark.parametrize(("law", "changes", "kind", "words"), [
+    (failing, {"law": True}, KeyError, "of the law's own"),
+    (lambda *_: math.nan, {"law": True}, (lm.InputError, lm.SolverError), "number"),
+    (lambda *_: math.inf, {"law": True}, (lm.InputError, lm.SolverError), "number"),
+    (lambda *_: "0.3", {"law": True}, (lm.InputError, TypeError), "number"),
+    (lambda *_: None, {"law": True}, (lm.InputError, TypeError), "number"),
+    (lambda time: 0.0, {"law": True}, TypeError, "argument"),
+    (None, {"law": True}, lm.InputError, "(?=.*law).*m"),
+    (3.0, {"law": True}, lm.InputError, "(?=.*law).*function"),
+    ({"n": python_law}, {"law": True}, lm.InputError, "(?=.*law).*m"),
+    (python_law, {"speed": {"gain": K}}, lm.InputError, "law"),
+    (lm.control.Law(python_law, states=-1), {"law": True}, lm.InputError, "states"),
+    (lm.control.Law(python_law, data=np.zeros(2)), {"law": True}, lm.InputError, "data"),
+])  # fmt: skip
 def test_a_law_that_fails_or_has_no_use_ends_the_run(law: Any, changes: dict[str, Any], kind: Any, words: str) -> None:
     with pytest.raises(kind, match=words):
         lm.simulate(loop(**changes), law=law)
 
 
 # --- filters ---
-
-
 def test_filters_are_those_of_scipy() -> None:
     T, f = 125e-6, 200.0
     w = 2.0 * math.pi * f
@@ -237,8 +231,6 @@ def test_a_filter_in_the_loop_is_lfilter_of_its_input() -> None:
 
 
 # --- what takes no controller ---
-
-
 @pytest.mark.parametrize("form", ["short", "long"])
 def test_what_follows_given_commands_refuses_a_controller(axis: lm.Scenario, form: str) -> None:
     scenario: Any = axis if form == "short" else axis.long()

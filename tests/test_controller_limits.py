@@ -236,8 +236,6 @@ def test_what_an_inverse_model_adapts_does_not_wind_up_at_a_limit() -> None:
 
 
 # --- continuous controllers ---
-
-
 def continuous(line: Line, controller: dict[str, Any], turn: float, end: float, **more: Any) -> Any:
     """A run of an inertia whose torque source such a controller commands."""
     source = {"shaft": "rotor", "kind": "torque_source", "rotor_inertia": line.inertia, "rated_torque": 0.7}
@@ -279,7 +277,6 @@ def test_state_space_without_decay_behind_a_limit_says_how_it_keeps_from_winding
 
 
 # --- every stated limit under every mode ---
-
 LINE = Line(2.0, 0.02, math.inf, 0.004)
 T, TAU = 2.5e-4, 2e-4
 HELD = 3.0 * max(T, TAU) / LINE.time

@@ -151,8 +151,6 @@ test_what_is_no_damper_is_refused = refusals_of(
 
 
 # --- torque limiters ---
-
-
 T_1, T_2 = 30.0, 8.0
 
 

@@ -375,17 +375,14 @@ def sealed(numbers: np.ndarray) -> np.ndarray:
     return np.concatenate([numbers[:2], [zlib.crc32(numbers[3:].astype("<f8").tobytes())], numbers[3:]])
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        (lambda n: n[:0], "these numbers are no description of a scenario"),
-        (lambda n: n[:100], "the description is cut off"),
-        (lambda n: np.concatenate([n[:1], [99.0], n[2:]]), "the description is of another version; write it anew"),
-        (lambda n: np.append(n, 0.0), "the description is damaged: its checksum is wrong; write it anew"),
-        (lambda n: sealed(np.append(n, 0.0)), "the description goes on beyond its end"),
-        (lambda n: sealed(np.concatenate([n[:4], np.where(n[4:] == 2.0, math.nan, n[4:])])), " is nan; it must be "),
-    ],
-)
+@pytest.mark.parametrize(("change", "said"), [
+    (lambda n: n[:0], "these numbers are no description of a scenario"),
+    (lambda n: n[:100], "the description is cut off"),
+    (lambda n: np.concatenate([n[:1], [99.0], n[2:]]), "the description is of another version; write it anew"),
+    (lambda n: np.append(n, 0.0), "the description is damaged: its checksum is wrong; write it anew"),
+    (lambda n: sealed(np.append(n, 0.0)), "the description goes on beyond its end"),
+    (lambda n: sealed(np.concatenate([n[:4], np.where(n[4:] == 2.0, math.nan, n[4:])])), " is nan; it must be "),
+])  # fmt: skip
 def test_numbers_that_are_no_description_are_refused(
     library: c.CDLL,  # noqa: F811
     change: Any,

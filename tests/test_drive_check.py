@@ -60,8 +60,6 @@ def move(duration: float = 0.25, **changes) -> lm.Scenario:
 
 
 # --- duty cycle ---
-
-
 def test_means_are_those_of_the_maker_s_worked_example():
     """Harmonic Drive, CSF & CSG catalogue, selection example: 319 N·m and 12 rpm (at the output)."""
     pattern = [(0.3, 7.0, 400.0), (3.0, 14.0, 320.0), (0.4, 7.0, -200.0)]  # s, rpm, N·m; then a pause of 0.2 s
@@ -139,8 +137,6 @@ def test_a_cycle_that_does_not_fit_the_run_is_refused():
 
 
 # --- holding ---
-
-
 def vertical(**changes) -> lm.Scenario:
     path = ROOT / "scenarios" / "overrunning-load.toml"
     return lm.load(path, {"command": 0.0, "simulation.duration": 4.0}).replace(**changes)
@@ -197,7 +193,6 @@ def test_a_load_that_slows_down_for_long_is_not_said_to_go_on():
 
 
 # --- all rules ---
-
 OF_THUMB = ("inertia_ratio", "resonance", "dead_zone", "end_stop")
 OTHERWISE = {
     "average_output_torque": {"gearbox.rated_output_torque": 1.0},
@@ -412,14 +407,11 @@ ROTOR = {"kind": "torque_source", "rotor_inertia": 2e-4, "rated_torque": 2.0}
 TRAVEL = 0.2 / (2.0 * math.pi)  # of a slide for a radian
 
 
-@pytest.mark.parametrize(
-    ("parts", "inertia"),
-    [
-        ({"rack": {"travel_per_turn": 0.2, "inertia": 1e-3}, "slide": {"mass": 50.0}, "gearbox": {"ratio": 5.0, "inertia": 1e-5}}, 1e-5 + (1e-3 + 50.0 * TRAVEL**2) / 25.0),
-        ({"belt": {"travel_per_turn": 0.2, "inertia": 2e-4}, "slide": {"mass": 10.0}, "payload": {"mass": 5.0}}, 2e-4 + 15.0 * TRAVEL**2),
-        ({"screw": {"lead": 0.2, "inertia": 5e-4, "efficiency": 0.9}, "slide": {"mass": 4.0}, "gearbox": {"ratio": 3.0, "inertia": 1e-5}}, 1e-5 + (5e-4 + 4.0 * TRAVEL**2) / 9.0),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("parts", "inertia"), [
+    ({"rack": {"travel_per_turn": 0.2, "inertia": 1e-3}, "slide": {"mass": 50.0}, "gearbox": {"ratio": 5.0, "inertia": 1e-5}}, 1e-5 + (1e-3 + 50.0 * TRAVEL**2) / 25.0),
+    ({"belt": {"travel_per_turn": 0.2, "inertia": 2e-4}, "slide": {"mass": 10.0}, "payload": {"mass": 5.0}}, 2e-4 + 15.0 * TRAVEL**2),
+    ({"screw": {"lead": 0.2, "inertia": 5e-4, "efficiency": 0.9}, "slide": {"mass": 4.0}, "gearbox": {"ratio": 3.0, "inertia": 1e-5}}, 1e-5 + (5e-4 + 4.0 * TRAVEL**2) / 9.0),
+])  # fmt: skip
 def test_the_inertia_of_an_axis_is_all_that_its_rotor_moves(parts: dict, inertia: float) -> None:
     axis = lm.Scenario(axis={"motor": ROTOR, **parts}, command={"mean": 0.2}, simulation={"duration": 0.1, "sample_interval": 0.01})
     ratio = next(f for f in lm.check_drive(axis) if f.rule == "inertia_ratio")
@@ -665,15 +657,12 @@ def test_a_brake_and_a_payload_of_an_axis_are_those_of_the_long_form():
     assert not held["motor_speed"].any()
 
 
-@pytest.mark.parametrize(
-    ("axis", "key"),
-    [
-        ({"brake": {"torque": 1.0}}, "axis.brake.command"),
-        ({"brake": {"torque": -1.0, "command": 0.0}}, "axis.brake.torque"),
-        ({"payload": {"mass": "2 m"}}, "axis.payload.mass"),
-        ({"payload": {"inertia": 2.0}}, "axis.payload.inertia"),
-    ],
-)
+@pytest.mark.parametrize(("axis", "key"), [
+    ({"brake": {"torque": 1.0}}, "axis.brake.command"),
+    ({"brake": {"torque": -1.0, "command": 0.0}}, "axis.brake.torque"),
+    ({"payload": {"mass": "2 m"}}, "axis.payload.mass"),
+    ({"payload": {"inertia": 2.0}}, "axis.payload.inertia"),
+])  # fmt: skip
 def test_what_is_wrong_with_them_is_said_with_the_key_of_the_file(axis, key):
     whole = {"motor": {"kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 2.0}, "slide": {"mass": 1.0}}
     refused(lambda: lm.Scenario(axis=whole | {"screw": {"lead": 0.02}} | axis, simulation={"duration": 1, "sample_interval": 0.1}), key)

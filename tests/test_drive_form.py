@@ -40,16 +40,12 @@ def long(load: dict[str, Any] | None = None, **gear: Any) -> lm.Scenario:
     )  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("load", "gearbox"),
-    [
-        ({"speed": {"amplitude": "20 rpm", "frequency": 2.0}}, {}),
-        ({"motion": MOVES}, {}),
-        ({"motion": MOVES}, {"stiffness": {"kind": "rigid"}}),
-        ({}, {"stiffness": FLANKS}),
-    ],
-    ids=["speed", "moves", "moves of a rigid gear", "flanks"],
-)
+@pytest.mark.parametrize(("load", "gearbox"), [
+    ({"speed": {"amplitude": "20 rpm", "frequency": 2.0}}, {}),
+    ({"motion": MOVES}, {}),
+    ({"motion": MOVES}, {"stiffness": {"kind": "rigid"}}),
+    ({}, {"stiffness": FLANKS}),
+], ids=["speed", "moves", "moves of a rigid gear", "flanks"])  # fmt: skip
 def test_the_short_form_has_the_bits_of_the_long_form(load: dict[str, Any], gearbox: dict[str, Any]) -> None:
     tables = short(load, **gearbox)
     jsonschema.validate(tables, file_schema())
@@ -61,15 +57,11 @@ def test_the_short_form_has_the_bits_of_the_long_form(load: dict[str, Any], gear
     assert lm.switchings_of(one).sizes["switching"] > 2
 
 
-@pytest.mark.parametrize(
-    "wider",
-    [
-        {"stiffness": FLANKS},
-        {"stiffness": {"kind": "rigid"}, "load": {"end_stops": {"lower": "-20 deg", "upper": "20 deg", "restitution": 0.4}}},
-        {"load": {"motion": MOVES}},
-    ],
-    ids=["flanks", "end stops", "moves"],
-)
+@pytest.mark.parametrize("wider", [
+    {"stiffness": FLANKS},
+    {"stiffness": {"kind": "rigid"}, "load": {"end_stops": {"lower": "-20 deg", "upper": "20 deg", "restitution": 0.4}}},
+    {"load": {"motion": MOVES}},
+], ids=["flanks", "end stops", "moves"])  # fmt: skip
 def test_replace_takes_the_keys_of_the_file_for_what_only_drive_trains_have(wider: dict[str, Any], tmp_path: Path) -> None:
     """As written into the file; twice, by the long form, and named so where a value cannot be used."""
     tables = short(**wider)
@@ -177,14 +169,11 @@ def test_a_slide_of_an_axis_moves_as_it_is_given(tmp_path: Path) -> None:
     assert result["slide_drive_force"].attrs["units"] == "N"
 
 
-@pytest.mark.parametrize(
-    ("keys", "message"),
-    [
-        ("", 'has backlash but is rigid; give it a stiffness, such as "200 N/um", or the restitution of its flanks, 0 to 1'),
-        ('restitution = 0.5\nstiffness = "100 N/um"', "has a restitution and a stiffness"),
-        ("restitution = 1.5", "axis.rack.restitution"),
-    ],
-)
+@pytest.mark.parametrize(("keys", "message"), [
+    ("", 'has backlash but is rigid; give it a stiffness, such as "200 N/um", or the restitution of its flanks, 0 to 1'),
+    ('restitution = 0.5\nstiffness = "100 N/um"', "has a restitution and a stiffness"),
+    ("restitution = 1.5", "axis.rack.restitution"),
+])  # fmt: skip
 def test_what_flanks_of_a_rack_need_is_said(tmp_path: Path, keys: str, message: str) -> None:
     path = tmp_path / "axis.toml"
     path.write_text(AXIS.replace("RIGID", keys).replace("MOVED", ""))

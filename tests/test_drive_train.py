@@ -64,8 +64,6 @@ def file(tmp_path: Path) -> Path:
 
 
 # --- files ---
-
-
 def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
     scenario = lm.load(file)
     assert scenario.form != DRIVE
@@ -75,56 +73,38 @@ def test_a_file_in_the_long_form_gives_the_train_in_si(file: Path) -> None:
     assert scenario.loaded() == ["table"]
 
 
-@pytest.mark.parametrize(
-    ("change", "line"),
-    [
-        ("gears.worm.output=tble", 'key gears.worm.output: "tble" is no shaft; did you mean table?'),
-        ("motors.m1.shaft=x", 'key motors.m1.shaft: "x" is no shaft; the shafts are motor, worm, table'),
-        ("gears.belt.outptu=x", "key gears.belt.outptu: is not known; did you mean output?"),
-        ("gears.wrm.ratio=3", "keys gears.wrm.input, gears.wrm.output: are missing; add them"),
-        ("gears.belt.ratio=0", "key gears.belt.ratio: 0 is no ratio; give input speed / output speed, below 0 for a gear that reverses"),
-        (
-            "shafts.table.inertia=2 kg",
-            'key shafts.table.inertia: "2 kg" has the unit of something else (kg); it must be a value in kg*m^2, such as "1 kg*m^2"',
-        ),
-        ("gears.belt.housing=tble", 'key gears.belt.housing: "tble" is no shaft; did you mean table?'),
-        (
-            "gears.belt.housing=worm",
-            "key gears.belt: has its housing on shaft 'worm', which it joins as well; give the housing a shaft of its own",
-        ),
-        (
-            "gears.worm.housing=motor",
-            "key gears.worm: has a housing that turns and losses that depend on the direction of its motion, which are "
-            "solved against the frame only; leave one of them out",
-        ),
-        ("gears.belt.output=motor", "key gears.belt: joins shaft 'motor' with itself; give it another output"),
-        ("shafts.idle.inertia=1", "key shafts.idle: is turned by nothing: no motor, gear or load torque acts on it; join it to the train"),
-        ("command.m2=1", "key command.m2: is no motor, brake or friction clutch of this train; those with a command are m1, hold"),
-        ("motor.rotor_inertia=1", "key motor: is not known; did you mean motors?"),
-        ("initial.speeds.motr=1", "key initial.speeds.motr: is no shaft of this train; did you mean motor?"),
-        ("initial.twists.belt=x", 'key initial.twists.belt: "x" is not one number with one unit; write a value in rad, such as "1 rad"'),
-        ("gears.belt.gearbox=nix", 'key gears.belt.gearbox: gearbox "nix" is not in the catalogue; `lostmotion catalogue` lists them'),
-        ("gears.belt.added_backlash=0.01", "key gears.belt.added_backlash: acts on a record; give gears.belt.gearbox, or leave it out"),
-        ("gears.belt.losses={kind='worm'}", "key gears.belt.losses: lacks lead_angle, or module, starts and diameter; add it"),
-        (
-            "gears.belt.losses={kind='worm',lead_angle=0.1}",
-            "key gears.belt.losses: lacks friction_angle and friction_coefficient; give one of them",
-        ),
-        (
-            "shafts.table.breakaway_torque=0.1",
-            "key shafts.table: has breakaway_torque = 0.1 N*m, less than its friction in motion, 0.5 N*m; give at least that, or leave it out",
-        ),
-        ("brakes.hold.torque=-1", "key brakes.hold.torque: -1.0 must be greater than 0"),
-        (
-            'brakes.second={shaft="worm",torque=1}',
-            "key command.second: is missing; add a number from 0 (open) to 1 (full torque), or a signal",
-        ),
-        (
-            'brakes.m1={shaft="worm",torque=1}',
-            "keys motors.m1, brakes.m1: have a result variable of the same name, m1_command; rename one of them",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("change", "line"), [
+    ("gears.worm.output=tble", 'key gears.worm.output: "tble" is no shaft; did you mean table?'),
+    ("motors.m1.shaft=x", 'key motors.m1.shaft: "x" is no shaft; the shafts are motor, worm, table'),
+    ("gears.belt.outptu=x", "key gears.belt.outptu: is not known; did you mean output?"),
+    ("gears.wrm.ratio=3", "keys gears.wrm.input, gears.wrm.output: are missing; add them"),
+    ("gears.belt.ratio=0", "key gears.belt.ratio: 0 is no ratio; give input speed / output speed, below 0 for a gear that reverses"),
+    ("shafts.table.inertia=2 kg", 'key shafts.table.inertia: "2 kg" has the unit of something else (kg); it must be a value in kg*m^2, such as "1 kg*m^2"'),
+    ("gears.belt.housing=tble", 'key gears.belt.housing: "tble" is no shaft; did you mean table?'),
+    ("gears.belt.housing=worm", "key gears.belt: has its housing on shaft 'worm', which it joins as well; give the housing a shaft of its own"),
+    (
+        "gears.worm.housing=motor",
+        "key gears.worm: has a housing that turns and losses that depend on the direction of its motion, which are "
+        "solved against the frame only; leave one of them out",
+    ),
+    ("gears.belt.output=motor", "key gears.belt: joins shaft 'motor' with itself; give it another output"),
+    ("shafts.idle.inertia=1", "key shafts.idle: is turned by nothing: no motor, gear or load torque acts on it; join it to the train"),
+    ("command.m2=1", "key command.m2: is no motor, brake or friction clutch of this train; those with a command are m1, hold"),
+    ("motor.rotor_inertia=1", "key motor: is not known; did you mean motors?"),
+    ("initial.speeds.motr=1", "key initial.speeds.motr: is no shaft of this train; did you mean motor?"),
+    ("initial.twists.belt=x", 'key initial.twists.belt: "x" is not one number with one unit; write a value in rad, such as "1 rad"'),
+    ("gears.belt.gearbox=nix", 'key gears.belt.gearbox: gearbox "nix" is not in the catalogue; `lostmotion catalogue` lists them'),
+    ("gears.belt.added_backlash=0.01", "key gears.belt.added_backlash: acts on a record; give gears.belt.gearbox, or leave it out"),
+    ("gears.belt.losses={kind='worm'}", "key gears.belt.losses: lacks lead_angle, or module, starts and diameter; add it"),
+    ("gears.belt.losses={kind='worm',lead_angle=0.1}", "key gears.belt.losses: lacks friction_angle and friction_coefficient; give one of them"),
+    (
+        "shafts.table.breakaway_torque=0.1",
+        "key shafts.table: has breakaway_torque = 0.1 N*m, less than its friction in motion, 0.5 N*m; give at least that, or leave it out",
+    ),
+    ("brakes.hold.torque=-1", "key brakes.hold.torque: -1.0 must be greater than 0"),
+    ('brakes.second={shaft="worm",torque=1}', "key command.second: is missing; add a number from 0 (open) to 1 (full torque), or a signal"),
+    ('brakes.m1={shaft="worm",torque=1}', "keys motors.m1, brakes.m1: have a result variable of the same name, m1_command; rename one of them"),
+])  # fmt: skip
 def test_what_is_wrong_with_a_train_is_said_in_one_line(file: Path, change: str, line: str) -> None:
     assert refused(lambda: lm.load(file, [change])) == f"{file}: {line}"
 
@@ -221,8 +201,6 @@ def test_the_schema_of_files_holds_all_forms() -> None:
 
 
 # --- elements ---
-
-
 def test_a_worm_follows_from_its_drawing() -> None:
     # m = 2 mm, one thread, d = 22.4 mm: tan g = 0.0892857; mu = 0.1: tan r = 0.1
     worm = lm.model.WormMesh(module="2 mm", starts=1, diameter="22.4 mm", friction_coefficient=0.1)
@@ -265,8 +243,6 @@ def test_trains_are_immutable_and_survive_pickling() -> None:
 
 
 # --- the short form as a train ---
-
-
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
 def test_a_drive_is_a_train_of_two_shafts(path: Path) -> None:
     drive = lm.load(path).drive()
@@ -282,7 +258,6 @@ def test_a_drive_is_a_train_of_two_shafts(path: Path) -> None:
 
 
 # --- runs ---
-
 SHARED = {"command": "motor_command", "load_torque": "load_load_torque", "twist": "gearbox_twist", "output_torque": "gearbox_output_torque"}
 SHARED |= {"input_contact": "motor_contact", "twist_contact": "gearbox_twist_contact"}
 SHARED |= {name: name for name in ("motor_torque", "motor_speed", "load_speed", "load_angle", "load_contact")}

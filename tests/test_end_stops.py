@@ -254,8 +254,6 @@ def test_what_takes_no_impacts_says_so() -> None:
 
 
 # --- figures and summary ---
-
-
 def test_figures_show_where_the_stops_are_and_what_presses_on_them() -> None:
     result = lm.simulate(ball({"restitution": 0.3}, duration=4.0))
     panels = {chart.title: chart for chart in run_charts(result)}

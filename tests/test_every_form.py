@@ -306,17 +306,14 @@ def test_a_train_of_one_gear_moves_to_the_last_bit_as_the_drive_that_it_is(seed:
     assert [(f.rule, f.verdict) for f in short] == [(f.rule, f.verdict) for f in long]
 
 
-@pytest.mark.parametrize(
-    ("name", "own", "long"),
-    [
-        ("ball-screw-axis", "axis.slide.mass", "slides.slide.mass"),
-        ("ball-screw-axis", "axis.screw.lead", "screws.screw.lead"),
-        ("ball-screw-axis", "controller.position.gain", "controllers.motor.position.gain"),
-        ("catalogue-robot-joint", "load.inertia", "shafts.load.inertia"),
-        ("catalogue-robot-joint", "command.amplitude", "command.motor.amplitude"),
-        ("position-axis", "controller.speed.gain", "controllers.motor.speed.gain"),
-    ],
-)
+@pytest.mark.parametrize(("name", "own", "long"), [
+    ("ball-screw-axis", "axis.slide.mass", "slides.slide.mass"),
+    ("ball-screw-axis", "axis.screw.lead", "screws.screw.lead"),
+    ("ball-screw-axis", "controller.position.gain", "controllers.motor.position.gain"),
+    ("catalogue-robot-joint", "load.inertia", "shafts.load.inertia"),
+    ("catalogue-robot-joint", "command.amplitude", "command.motor.amplitude"),
+    ("position-axis", "controller.speed.gain", "controllers.motor.speed.gain"),
+])  # fmt: skip
 def test_a_key_of_the_file_and_that_of_the_long_form_are_one(name: str, own: str, long: str) -> None:
     scenario = lm.load(name).replace(**{"simulation.duration": 0.01, "simulation.sample_interval": 0.001})
     value = 1.25 * lm.simulation.runs.sensitivities.value_at(scenario, own)

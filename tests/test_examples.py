@@ -110,8 +110,6 @@ def test_the_batch_of_axes_is_a_vectorised_environment() -> None:
 
 
 # --- the notebooks of the documentation run from the first cell to the last, and are stored without output ---
-
-
 NOTEBOOKS = sorted((ROOT / "docs" / "notebooks").glob("*.ipynb"))
 
 

@@ -68,8 +68,6 @@ def scenario(a: Axis, ticks: int, **controller: Any) -> lm.Scenario:
 
 
 # --- the full equations ---
-
-
 def random_axis(rng: np.random.Generator, number: int) -> Axis:
     """Round and salient rotors by turns, from 0.3 to 3 times the speed at which the voltage of the magnets is all there is."""
 
@@ -157,7 +155,6 @@ def test_the_error_falls_with_the_fourth_power_of_the_stretch() -> None:
 
 
 # --- closed forms ---
-
 ROUND = Axis(
     p=4, R=0.8, L_d=5e-3, L_q=5e-3, psi=0.09, u_max=300.0, i_max=20.0, J_M=1e6, J_Z=1e-3, friction=0.0, ratio=1.0,
     stiffness=1e3, gap=0.0, tick=T,
@@ -251,8 +248,6 @@ def test_what_the_inverter_gives_is_heat_field_and_work() -> None:
 
 
 # --- what must not change a run ---
-
-
 def shown(result: Any) -> dict[str, np.ndarray]:
     names = ("direct_current", "quadrature_current", "motor_speed", "load_angle", "twist", "electrical_energy")
     return {name: result[name].to_numpy() for name in names}
@@ -384,19 +379,14 @@ def test_an_encoder_that_is_turned_by_its_steps_misplaces_the_currents() -> None
 
 
 # --- what is refused, and what is shown ---
-
-
-@pytest.mark.parametrize(
-    ("changes", "words"),
-    [
-        ({"motor.kind": "torque_source", "motor.dc_voltage": None}, ["controller.current.kind", "synchronous"]),
-        ({"motor.winding.max_current_peak": None}, ["controller.current.kind", "max_current_rms"]),
-        ({"motor.winding.inductance_d": 0.5}, ["controller.current.kind", "flux linkage"]),
-        ({"controller.current.field_weakening": 1.5}, ["controller.current.field_weakening"]),
-        ({"controller.current.decoupling": -0.1}, ["controller.current.decoupling"]),
-        ({"initial.motor_torque": 0.1}, ["initial.motor_torque", "no current"]),
-    ],
-)
+@pytest.mark.parametrize(("changes", "words"), [
+    ({"motor.kind": "torque_source", "motor.dc_voltage": None}, ["controller.current.kind", "synchronous"]),
+    ({"motor.winding.max_current_peak": None}, ["controller.current.kind", "max_current_rms"]),
+    ({"motor.winding.inductance_d": 0.5}, ["controller.current.kind", "flux linkage"]),
+    ({"controller.current.field_weakening": 1.5}, ["controller.current.field_weakening"]),
+    ({"controller.current.decoupling": -0.1}, ["controller.current.decoupling"]),
+    ({"initial.motor_torque": 0.1}, ["initial.motor_torque", "no current"]),
+])  # fmt: skip
 def test_what_cannot_be_controlled_so_is_refused(changes: dict[str, Any], words: list[str]) -> None:
     data = scenario(changed(ROUND, J_M=1e-3), 10).model_dump(exclude_none=True)
     for key, value in changes.items():
@@ -469,8 +459,6 @@ def test_currents_that_are_sampled_too_seldom_are_told() -> None:
 
 
 # --- another simulator ---
-
-
 def motulator_run(ticks: int) -> tuple[np.ndarray, np.ndarray]:
     """The two-mass example of motulator under its own current vector control and speed control, integrated at 1e-12 in place of its 1e-3.
 

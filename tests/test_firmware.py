@@ -217,25 +217,22 @@ def test_torque_in_python_is_that_of_the_core() -> None:
         assert servo.torque(error, speed) == pytest.approx(law(error, speed, 1.5), rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("make", "firmware", "changes", "message"),
-    [
-        (continuous, {"supply_resistance": 1.0}, {}, r"firmware\.supply_resistance: makes the torque depend on error and speed"),
-        (continuous, {"goal_rate_limit": 4.0}, {}, r"firmware\.goal_rate_limit: acts from sample to sample"),
-        (continuous, {"goal_acceleration_limit": 4.0}, {}, r"firmware\.goal_acceleration_limit: acts from sample to"),
-        (continuous, {"goal_filter_time": 4e-3}, {}, r"firmware\.goal_filter_time: acts from sample to sample"),
-        (sampled, {"goal_rate_limit": 0.0}, {}, r"goal_rate_limit"),
-        (sampled, {"duty": {"errors": [0.0, 0.1, 0.1], "values": [0.0, 0.5, 0.6]}}, {}, "errors that do not rise"),
-        (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.1, 0.5]}}, {}, "does not begin at 0"),
-        (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.0, 1.5]}}, {}, "1.5"),
-        (sampled, {"resistance": 0.0}, {}, "resistance"),
-        (sampled, {}, {"current": {"kind": "pi"}}, "which commands the voltage"),
-        (sampled, {}, {"law": True}, "both are the loops"),
-        (sampled, {}, {"reference": {"kind": "speed", "mean": 1.0}}, "reference.kind"),
-        (sampled, {}, {"position": {"gain": 10.0}}, "has no use with a firmware"),
-        (sampled, {}, {"encoder": None}, "lacks encoder"),
-    ],
-)
+@pytest.mark.parametrize(("make", "firmware", "changes", "message"), [
+    (continuous, {"supply_resistance": 1.0}, {}, r"firmware\.supply_resistance: makes the torque depend on error and speed"),
+    (continuous, {"goal_rate_limit": 4.0}, {}, r"firmware\.goal_rate_limit: acts from sample to sample"),
+    (continuous, {"goal_acceleration_limit": 4.0}, {}, r"firmware\.goal_acceleration_limit: acts from sample to"),
+    (continuous, {"goal_filter_time": 4e-3}, {}, r"firmware\.goal_filter_time: acts from sample to sample"),
+    (sampled, {"goal_rate_limit": 0.0}, {}, r"goal_rate_limit"),
+    (sampled, {"duty": {"errors": [0.0, 0.1, 0.1], "values": [0.0, 0.5, 0.6]}}, {}, "errors that do not rise"),
+    (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.1, 0.5]}}, {}, "does not begin at 0"),
+    (sampled, {"duty": {"errors": [0.0, 0.1], "values": [0.0, 1.5]}}, {}, "1.5"),
+    (sampled, {"resistance": 0.0}, {}, "resistance"),
+    (sampled, {}, {"current": {"kind": "pi"}}, "which commands the voltage"),
+    (sampled, {}, {"law": True}, "both are the loops"),
+    (sampled, {}, {"reference": {"kind": "speed", "mean": 1.0}}, "reference.kind"),
+    (sampled, {}, {"position": {"gain": 10.0}}, "has no use with a firmware"),
+    (sampled, {}, {"encoder": None}, "lacks encoder"),
+])  # fmt: skip
 def test_bad_firmware_is_refused(make: Any, firmware: dict[str, Any], changes: dict[str, Any], message: str) -> None:
     with pytest.raises((InputError, ValueError), match=message):
         axis(make(SERVO | firmware, **changes))

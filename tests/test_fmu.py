@@ -443,17 +443,14 @@ def test_more_indicators_than_there_can_be_are_refused(drum: Path, tmp_path: Pat
             fmu.instantiate()
 
 
-@pytest.mark.parametrize(
-    ("directories", "said"),
-    [
-        (("linux64",), "It runs on Linux x86-64; `make fmu` adds"),
-        (("x86_64-linux", "aarch64-windows"), "It runs on Windows aarch64, Linux x86-64; `make fmu` adds"),
-        (
-            ("linux64", "win64", "darwin64", "aarch64-linux", "aarch64-windows", "aarch64-darwin"),
-            "It runs on macOS aarch64, Linux aarch64, Windows aarch64, macOS x86-64, Linux x86-64, Windows x86-64.",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("directories", "said"), [
+    (("linux64",), "It runs on Linux x86-64; `make fmu` adds"),
+    (("x86_64-linux", "aarch64-windows"), "It runs on Windows aarch64, Linux x86-64; `make fmu` adds"),
+    (
+        ("linux64", "win64", "darwin64", "aarch64-linux", "aarch64-windows", "aarch64-darwin"),
+        "It runs on macOS aarch64, Linux aarch64, Windows aarch64, macOS x86-64, Linux x86-64, Windows x86-64.",
+    ),
+])  # fmt: skip
 def test_the_command_prints_the_platforms_of_an_fmu(directories: tuple[str, ...], said: str, tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "x.fmu", "w") as file:
         for name in directories:

@@ -113,8 +113,6 @@ def test_other_platforms_give_the_bits_of_python(platform: str, tmp_path: Path) 
 
 
 # --- what an FMU declares of its structure holds in the regimes of runs, whose exact linear models say what depends on what ---
-
-
 OPEN_LOOP = ("paper-2dof-nl-small", "lossy-rigid-gear", "two-motors-one-ring", "worm-lowering")
 
 

@@ -129,8 +129,6 @@ def test_a_command_writes_only_what_it_is_asked_for_and_names_the_next_one(
 
 
 # --- docstrings of the public names ---
-
-
 SPACES = [name for name, home in homes_of("lostmotion").items() if home == "lostmotion"]
 
 

@@ -331,8 +331,6 @@ def test_examples_run(path: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatc
 
 
 # --- the core's tables of names and parameters, from which Python and the binding are made ---
-
-
 # What the core has no use for as it stands in a file: ratings, texts, the two voltages of which it takes the ratio, and what
 # makes a synchronous motor a DC motor.
 # The line of a motor becomes its rated point.
@@ -425,8 +423,6 @@ def test_a_cause_s_number_goes_with_what_the_contacts_do() -> None:
 
 
 # --- functions that give the same bits on every platform, against NumPy and SciPy; their errors are tested in the core ---
-
-
 RANDOM = np.random.default_rng(5)
 ULP = 2.0**-52  # relative, at most
 ANGLES = np.concatenate([RANDOM.uniform(-20.0, 20.0, 2000), RANDOM.uniform(-1e9, 1e9, 200), [0.0, -0.0]])
@@ -435,18 +431,15 @@ NEAR_ONE = RANDOM.uniform(0.1, 10.0, 2000)
 
 
 # The functions of NumPy are good to 4 units in the last place or better.
-@pytest.mark.parametrize(
-    ("own", "other", "x", "units"),
-    [
-        (r.sin, np.sin, ANGLES, 5.0),
-        (r.cos, np.cos, ANGLES, 5.0),
-        (r.tan, np.tan, ANGLES, 7.0),
-        (r.exp, np.exp, ANGLES[:2000], 6.0),
-        (r.expm1, np.expm1, np.concatenate([ANGLES[:2000], 1e-9 * ANGLES]), 7.0),
-        (r.log, np.log, POSITIVE, 6.0),
-        (r.cbrt, np.cbrt, np.concatenate([POSITIVE, -POSITIVE]), 5.0),
-    ],
-)
+@pytest.mark.parametrize(("own", "other", "x", "units"), [
+    (r.sin, np.sin, ANGLES, 5.0),
+    (r.cos, np.cos, ANGLES, 5.0),
+    (r.tan, np.tan, ANGLES, 7.0),
+    (r.exp, np.exp, ANGLES[:2000], 6.0),
+    (r.expm1, np.expm1, np.concatenate([ANGLES[:2000], 1e-9 * ANGLES]), 7.0),
+    (r.log, np.log, POSITIVE, 6.0),
+    (r.cbrt, np.cbrt, np.concatenate([POSITIVE, -POSITIVE]), 5.0),
+])  # fmt: skip
 def test_functions_of_one_number_are_those_of_numpy(own, other, x, units) -> None:
     wanted = other(x)
     assert np.all(np.abs(own(x) - wanted) <= units * ULP * np.abs(wanted))

@@ -115,16 +115,13 @@ def test_what_keeps_an_axis_from_hunting_is_named() -> None:
     assert lm.hunting_certificate(scenario.replace(**{"controllers.servo.limit": 8.5 / 50.0})).verdict != "does not hunt"
 
 
-@pytest.mark.parametrize(
-    ("changes", "reason"),
-    [
-        ({"shafts.motor.friction_torque": 0.01}, "2 dry contacts, motor_contact, table_contact"),
-        ({"gravity": {"arm": {"shaft": "table", "mass": 1.0, "radius": 0.1}}}, "regime: it has gravity"),
-        ({"shafts.table.stribeck_speed": 0.1}, "friction of table that varies with speed"),
-        ({"controllers.servo.position.integral_gain": 80.0}, "the linear loop is unstable"),
-        ({"gears.drive.stiffness": {"kind": "curve", "backlash": 1e-3, "slopes": [2e4], "breaks": []}}, "segments of drive"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "reason"), [
+    ({"shafts.motor.friction_torque": 0.01}, "2 dry contacts, motor_contact, table_contact"),
+    ({"gravity": {"arm": {"shaft": "table", "mass": 1.0, "radius": 0.1}}}, "regime: it has gravity"),
+    ({"shafts.table.stribeck_speed": 0.1}, "friction of table that varies with speed"),
+    ({"controllers.servo.position.integral_gain": 80.0}, "the linear loop is unstable"),
+    ({"gears.drive.stiffness": {"kind": "curve", "backlash": 1e-3, "slopes": [2e4], "breaks": []}}, "segments of drive"),
+])  # fmt: skip
 def test_what_is_not_decided_is_named(changes: dict[str, Any], reason: str) -> None:
     certificate = lm.hunting_certificate(lm.load("hunting-with-static-friction").replace(**changes))
     assert certificate.verdict == "not decided"

@@ -105,18 +105,11 @@ def test_the_rig_is_locked_driven_and_driven_back(gearbox: lm.Gearbox) -> None:
             assert abs(channel.values[0]) < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("stiffness", "losses", "names"),
-    [
-        (lm.model.LinearStiffness(stiffness=1e4), lm.model.ConstantEfficiency(efficiency=0.9), ["stiffness", "efficiency"]),
-        (
-            lm.model.TorsionCurve(slopes=(1e4,), backlash=1e-3),
-            lm.model.ConstantEfficiency(efficiency=0.9),
-            ["stiffness_1", "backlash", "efficiency"],
-        ),
-        (lm.model.Rigid(), lm.model.ConstantEfficiency(efficiency=0.9), ["efficiency"]),
-    ],
-)
+@pytest.mark.parametrize(("stiffness", "losses", "names"), [
+    (lm.model.LinearStiffness(stiffness=1e4), lm.model.ConstantEfficiency(efficiency=0.9), ["stiffness", "efficiency"]),
+    (lm.model.TorsionCurve(slopes=(1e4,), backlash=1e-3), lm.model.ConstantEfficiency(efficiency=0.9), ["stiffness_1", "backlash", "efficiency"]),
+    (lm.model.Rigid(), lm.model.ConstantEfficiency(efficiency=0.9), ["efficiency"]),
+])  # fmt: skip
 def test_every_law_of_a_gearbox_has_its_parameters(stiffness: object, losses: object, names: list[str], gearbox: lm.Gearbox) -> None:
     changed = lm.Gearbox(**{**gearbox.model_dump(), "stiffness": stiffness, "losses": losses})
     assert [name for name in parameters(changed)[0] if name not in ("inertia", "mesh_damping")] == names

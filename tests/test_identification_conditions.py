@@ -34,14 +34,11 @@ def run(directory: Path, fit: dict[str, Any] | None = None, **logs: Any) -> lm.i
     return identify_task(spring_task(directory, **more), directory)
 
 
-@pytest.mark.parametrize(
-    ("condition", "held_out"),
-    [
-        ('folder == "heavy"', {"heavy/a.csv", "heavy/b.csv"}),
-        ('file == "b.csv" or folder == "heavy"', {"heavy/a.csv", "heavy/b.csv", "light/b.csv"}),
-        ('file == "a.csv" and folder == "light"', {"light/a.csv"}),
-    ],
-)
+@pytest.mark.parametrize(("condition", "held_out"), [
+    ('folder == "heavy"', {"heavy/a.csv", "heavy/b.csv"}),
+    ('file == "b.csv" or folder == "heavy"', {"heavy/a.csv", "heavy/b.csv", "light/b.csv"}),
+    ('file == "a.csv" and folder == "light"', {"light/a.csv"}),
+])  # fmt: skip
 def test_logs_are_held_out_by_their_file_and_folder(folders: Path, condition: str, held_out: set[str]) -> None:
     result = run(folders, held_out=condition)
     assert {log.name for log in result.logs if log.held_out} == held_out

@@ -147,8 +147,6 @@ def test_a_supply_that_sags_a_filter_and_the_rate_of_the_goal_are_found(tmp_path
 
 
 # --- the EMPS axis, from public data that are not shipped (Janot, Gautier, Brunot 2019) ---
-
-
 EMPS = ROOT / "examples" / "emps"
 DATA = os.environ.get("LOSTMOTION_EMPS", "")
 NAMES = ("DATA_EMPS.mat", "DATA_EMPS_PULSES.mat")

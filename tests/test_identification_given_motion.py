@@ -88,14 +88,11 @@ def test_derivatives_with_a_given_motion_are_those_of_small_differences(tmp_path
             assert J[..., n] == pytest.approx((a - b) / (2.0 * h), abs=1e-6 * max(1e-3, np.abs(J[..., n]).max()))
 
 
-@pytest.mark.parametrize(
-    ("given", "message"),
-    [
-        ({"smoothing": 0.0}, 'is an angle; give smoothing, such as "20 ms"'),
-        ({"smoothing": 2e-3}, "has 3 samples of 0.csv"),
-        ({"interpolation": "hold"}, "would make the speed jump"),
-    ],
-)
+@pytest.mark.parametrize(("given", "message"), [
+    ({"smoothing": 0.0}, 'is an angle; give smoothing, such as "20 ms"'),
+    ({"smoothing": 2e-3}, "has 3 samples of 0.csv"),
+    ({"interpolation": "hold"}, "would make the speed jump"),
+])  # fmt: skip
 def test_a_motion_that_cannot_be_given_is_refused(tmp_path: Path, given: dict[str, Any], message: str) -> None:
     with pytest.raises(lm.InputError, match=message):
         rig = rig_of(tmp_path, **given)

@@ -100,22 +100,19 @@ def as_json(path: Path) -> None:
     path.write_text(json.dumps({"mass": 0.5, "entries": entries()}))
 
 
-@pytest.mark.parametrize(
-    ("name", "write", "header"),
-    [
-        ("log.csv", as_csv, {"mass": 0.5}),
-        ("log5.mat", as_mat5, {"mass": 0.5}),
-        ("log73.mat", as_mat73, {"mass": 0.5}),
-        ("log.parquet", as_parquet, {"mass": 0.5}),
-        ("log.tdms", as_tdms, {"mass": 0.5}),
-        ("log.mf4", as_mdf, {}),
-        ("log.npz", as_npz, {"mass": 0.5}),
-        ("log.npy", as_npy, {}),
-        ("log.xlsx", as_xlsx, {"mass": 0.5}),
-        ("log.h5", as_hdf5, {"mass": 0.5, "operator": "somebody"}),
-        ("log.json", as_json, {"mass": 0.5}),
-    ],
-)
+@pytest.mark.parametrize(("name", "write", "header"), [
+    ("log.csv", as_csv, {"mass": 0.5}),
+    ("log5.mat", as_mat5, {"mass": 0.5}),
+    ("log73.mat", as_mat73, {"mass": 0.5}),
+    ("log.parquet", as_parquet, {"mass": 0.5}),
+    ("log.tdms", as_tdms, {"mass": 0.5}),
+    ("log.mf4", as_mdf, {}),
+    ("log.npz", as_npz, {"mass": 0.5}),
+    ("log.npy", as_npy, {}),
+    ("log.xlsx", as_xlsx, {"mass": 0.5}),
+    ("log.h5", as_hdf5, {"mass": 0.5, "operator": "somebody"}),
+    ("log.json", as_json, {"mass": 0.5}),
+])  # fmt: skip
 def test_every_format_gives_the_same_log(tmp_path: Path, name: str, write: Callable[[Path], Any], header: dict[str, Any]) -> None:
     write(tmp_path / name)
     log = read_log(tmp_path / name)
@@ -413,18 +410,15 @@ def test_dates_and_other_sheets_of_a_workbook(tmp_path: Path) -> None:
     assert log.notes[-1] == "sheet run is read; left out are empty, remarks"
 
 
-@pytest.mark.parametrize(
-    ("heading", "channels"),
-    [
-        ("time [s],pos (5),pos (3)", {"pos (5)": "", "pos (3)": ""}),
-        ("time [s],load (5),speed (rpm)", {"load (5)": "", "speed": "rpm"}),
-        ("time (s),joint[0],joint[1]", {"joint[0]": "", "joint[1]": ""}),
-        ("time (s),efficiency [1],pos (deg)", {"efficiency": "1", "pos": "deg"}),
-        ("time [s],pos (left),pos (right)", {"pos (left)": "", "pos (right)": ""}),
-        ("time [s],pos,pos (left)", {"pos": "", "pos (left)": ""}),
-        ("t,cell (-2.5),raw (counts)", {"cell (-2.5)": "", "raw": "counts"}),
-    ],
-)
+@pytest.mark.parametrize(("heading", "channels"), [
+    ("time [s],pos (5),pos (3)", {"pos (5)": "", "pos (3)": ""}),
+    ("time [s],load (5),speed (rpm)", {"load (5)": "", "speed": "rpm"}),
+    ("time (s),joint[0],joint[1]", {"joint[0]": "", "joint[1]": ""}),
+    ("time (s),efficiency [1],pos (deg)", {"efficiency": "1", "pos": "deg"}),
+    ("time [s],pos (left),pos (right)", {"pos (left)": "", "pos (right)": ""}),
+    ("time [s],pos,pos (left)", {"pos": "", "pos (left)": ""}),
+    ("t,cell (-2.5),raw (counts)", {"cell (-2.5)": "", "raw": "counts"}),
+])  # fmt: skip
 def test_a_number_in_brackets_belongs_to_the_name_of_a_column(tmp_path: Path, heading: str, channels: dict[str, str]) -> None:
     path = tmp_path / "log.csv"
     path.write_text(f"{heading}\n0,1,2\n1,3,4\n2,5,6\n")

@@ -87,14 +87,11 @@ def test_offsets_are_added_after_the_scale_and_first_values_contain_them(tmp_pat
     assert found.values["coulomb"] == pytest.approx(0.1, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("limit", "viscous", "state", "words"),
-    [
-        (2.0, 0.02, "fits", "position fits to 0.05"),
-        (1e-3, 0.02, "does not fit", "is left of a motion of"),
-        (2.0, 0.025, "fits with a reservation", "a systematic error is left"),
-    ],
-)
+@pytest.mark.parametrize(("limit", "viscous", "state", "words"), [
+    (2.0, 0.02, "fits", "position fits to 0.05"),
+    (1e-3, 0.02, "does not fit", "is left of a motion of"),
+    (2.0, 0.025, "fits with a reservation", "a systematic error is left"),
+])  # fmt: skip
 def test_the_verdict_says_how_well_the_model_describes_the_logs(
     tmp_path: Path, limit: float, viscous: float, state: str, words: str
 ) -> None:

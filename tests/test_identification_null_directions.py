@@ -49,15 +49,12 @@ def test_two_delays_in_a_row_are_a_sum(tmp_path: Path, late: float) -> None:
     }
 
 
-@pytest.mark.parametrize(
-    ("values", "scale", "offset", "what"),
-    [
-        ({"gain": 1.1, "volts": 0.9}, "gain*volts", 0.0, {"product gain*volts", "product volts*gain"}),
-        ({"gain": 1.1, "volts": 1.2}, "gain/volts", 0.0, {"ratio gain/volts", "ratio volts/gain"}),
-        ({"gain": 0.5, "volts": 0.55}, "gain + volts", 0.0, {"sum gain + volts", "sum volts + gain"}),
-        ({"p": 1.0, "q": 1.1}, 1.0, "p - q", {"difference p - q", "difference q - p"}),
-    ],
-)
+@pytest.mark.parametrize(("values", "scale", "offset", "what"), [
+    ({"gain": 1.1, "volts": 0.9}, "gain*volts", 0.0, {"product gain*volts", "product volts*gain"}),
+    ({"gain": 1.1, "volts": 1.2}, "gain/volts", 0.0, {"ratio gain/volts", "ratio volts/gain"}),
+    ({"gain": 0.5, "volts": 0.55}, "gain + volts", 0.0, {"sum gain + volts", "sum volts + gain"}),
+    ({"p": 1.0, "q": 1.1}, 1.0, "p - q", {"difference p - q", "difference q - p"}),
+])  # fmt: skip
 def test_the_combination_that_is_determined_is_that_of_the_formula(
     tmp_path: Path, values: dict[str, float], scale: Any, offset: Any, what: set[str]
 ) -> None:
@@ -66,16 +63,13 @@ def test_the_combination_that_is_determined_is_that_of_the_formula(
     assert said.removeprefix("only the ").partition(" is determined")[0] in what
 
 
-@pytest.mark.parametrize(
-    ("values", "scale", "said"),
-    [
-        ({"a": 1.1, "b": 0.9, "c": 1.3}, "a*b*c", "the product {a*b*c}"),
-        ({"a": 1.1, "b": 0.9, "c": 1.3}, "a*b/c", "{a*b}/c"),
-        ({"a": 0.4, "b": 0.35, "c": 0.3}, "a + b + c", "the sum {a + b + c}"),
-        ({"a": 0.9, "b": 0.9, "c": 0.8}, "a + b - c", "{a + b} - c"),
-        ({"a": 0.5, "b": 0.6, "c": 1.2}, "(a + b)*c", "one combination of {a, b, c}"),
-    ],
-)
+@pytest.mark.parametrize(("values", "scale", "said"), [
+    ({"a": 1.1, "b": 0.9, "c": 1.3}, "a*b*c", "the product {a*b*c}"),
+    ({"a": 1.1, "b": 0.9, "c": 1.3}, "a*b/c", "{a*b}/c"),
+    ({"a": 0.4, "b": 0.35, "c": 0.3}, "a + b + c", "the sum {a + b + c}"),
+    ({"a": 0.9, "b": 0.9, "c": 0.8}, "a + b - c", "{a + b} - c"),
+    ({"a": 0.5, "b": 0.6, "c": 1.2}, "(a + b)*c", "one combination of {a, b, c}"),
+])  # fmt: skip
 def test_one_value_of_three_is_one_sentence(tmp_path: Path, values: dict[str, float], scale: str, said: str) -> None:
     """Two null directions, which any rotation mixes: no pair of the three is determined."""
     result = identified(tmp_path, values, input={"scale": scale})

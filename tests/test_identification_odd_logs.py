@@ -193,8 +193,6 @@ def test_a_log_of_another_rate_is_refused_where_its_times_cannot_be_seconds(tmp_
 
 
 # --- faults that many logs share are the model's ---
-
-
 TIME = np.arange(800) / 200
 
 

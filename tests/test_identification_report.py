@@ -133,8 +133,6 @@ def test_models_of_other_logs_are_not_continued(tmp_path: Path) -> None:
 
 
 # --- A first identification file ---
-
-
 TIME = np.arange(0.0, 2.0, 0.01)
 FORCE, MASS, VISCOUS = 400.0, 80.0, 150.0  # N, kg, N*s/m
 
@@ -236,17 +234,14 @@ def test_what_is_in_doubt_is_said(logs: Path) -> None:
         assert line in text, text
 
 
-@pytest.mark.parametrize(
-    ("words", "code", "said"),
-    [
-        (["new"], 2, "needs the directory of the logs"),
-        (["new", "nowhere"], 1, "nowhere: is no directory"),
-        (["new", "empty"], 1, "empty: has no log; logs end in .json, .jsonl, .csv"),
-        (["new", "bad"], 1, "none of its 1 logs can be read"),
-        (["x.toml", "empty"], 2, "DIR goes with `identify new`"),
-        (["x.toml", "--rig", "rig.toml"], 2, "--rig goes with `identify new`"),
-    ],
-)
+@pytest.mark.parametrize(("words", "code", "said"), [
+    (["new"], 2, "needs the directory of the logs"),
+    (["new", "nowhere"], 1, "nowhere: is no directory"),
+    (["new", "empty"], 1, "empty: has no log; logs end in .json, .jsonl, .csv"),
+    (["new", "bad"], 1, "none of its 1 logs can be read"),
+    (["x.toml", "empty"], 2, "DIR goes with `identify new`"),
+    (["x.toml", "--rig", "rig.toml"], 2, "--rig goes with `identify new`"),
+])  # fmt: skip
 def test_wrong_calls_end_in_one_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, words: list[str], code: int, said: str) -> None:
     monkeypatch.chdir(tmp_path)
     (tmp_path / "empty").mkdir()

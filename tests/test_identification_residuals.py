@@ -158,7 +158,6 @@ def test_a_command_that_repeats_its_values_is_held(tmp_path: Path) -> None:
 
 
 # --- what is missing in the model ---
-
 SPINDLE = """
 shafts.spindle = { viscous_friction = 0.02, friction_torque = 0.1 }
 motors.drive = { shaft = "spindle", kind = "torque_source", rated_torque = 1.0, rotor_inertia = 5e-3 }

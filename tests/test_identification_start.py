@@ -118,15 +118,12 @@ def test_a_weight_is_linear_however_many_straight_lines_its_torque_has(tmp_path:
     assert not start.kept and start.found["weight"] == pytest.approx(VALUES["weight"], rel=0.05)
 
 
-@pytest.mark.parametrize(
-    ("change", "why"),
-    [
-        ({"gears.belt.losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}}, "belt"),
-        ({"motors.drive.kind": "dc"}, "voltage as its command"),
-        ({"shafts.arm.drag": {"kind": "quadratic", "coefficient": 0.1, "max_speed": 9.0}}, "drag"),
-        ({"command.drive": {"amplitude": 1.0, "frequency": 1.0}}, "changes with time"),
-    ],
-)
+@pytest.mark.parametrize(("change", "why"), [
+    ({"gears.belt.losses": {"kind": "mesh_efficiency", "drive_efficiency": 0.9, "backdrive_efficiency": 0.8}}, "belt"),
+    ({"motors.drive.kind": "dc"}, "voltage as its command"),
+    ({"shafts.arm.drag": {"kind": "quadratic", "coefficient": 0.1, "max_speed": 9.0}}, "drag"),
+    ({"command.drive": {"amplitude": 1.0, "frequency": 1.0}}, "changes with time"),
+])  # fmt: skip
 def test_where_the_torques_are_not_known_the_starts_stay(tmp_path: Path, change: dict[str, Any], why: str) -> None:
     starts = dict(VALUES)
     del starts["radius"]

@@ -219,8 +219,6 @@ def test_logs_of_one_name_keep_apart(servo: Path) -> None:
 
 
 # --- what a log lacks ---
-
-
 @pytest.mark.parametrize(("unit", "factor"), [("rad", 1.0), ("mrad", 1e3), ("deg", 180.0 / np.pi)])
 def test_a_log_in_another_unit_gives_the_same_mass(tmp_path: Path, unit: str, factor: float) -> None:
     """The first value of the channel is where the run begins."""

@@ -24,8 +24,6 @@ def at_end(result: Any, chain: Chain) -> Vector:
 
 
 # --- several gears ---
-
-
 IN_TURN: dict[str, Any] = {
     "inertias": np.array([20.0, 0.5, 0.7]),
     "torques": np.array([0.0, -1.0, -0.49]),
@@ -170,8 +168,6 @@ def test_an_elastic_flank_comes_to_rest_where_others_lose_energy(duration: float
 
 
 # --- gears that lock in motion ---
-
-
 def worm(stiffness: float | None, *, eta_b: float = -0.3, mass: float = 2.0) -> lm.Scenario:
     """A worm that lifts; at 0.1 s the motor is switched off and the load turns round, so that it drives on."""
     mesh: dict[str, Any] = {"kind": "rigid"} if stiffness is None else {"kind": "linear", "stiffness": stiffness}
@@ -336,8 +332,6 @@ def test_a_gear_that_does_not_lock_goes_on() -> None:
 
 
 # --- the start ---
-
-
 def test_a_clutch_that_is_closed_at_the_start_holds_what_its_static_limit_holds() -> None:
     """Shafts of 0.0458 and 0.0301 kg m^2: common acceleration needs M J_2/(J_1 + J_2) = 0.639 N m, below 0.672, above 0.5."""
     J, needed = (0.0458, 0.0301), 0.639

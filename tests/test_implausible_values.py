@@ -119,17 +119,14 @@ def test_the_bare_numbers_of_a_list_of_tables_are_printed_back() -> None:
     assert "controller.reference.moves.0.to: 0.2 m; a bare number" in slide
 
 
-@pytest.mark.parametrize(
-    ("name", "key", "unit"),
-    [
-        ("position-axis", "controller.reference.speed", "rad/s"),
-        ("position-axis", "controller.reference.moves.0.to", "rad"),
-        ("speed-axis", "controller.reference.mean", "rad/s"),
-        ("speed-axis", "controller.reference.steps.0.height", "rad/s"),
-        ("ball-screw-axis", "controller.reference.speed", "m/s"),
-        ("gantry-two-screws", "controllers.left_servo.reference.moves.0.to", "m"),
-    ],
-)
+@pytest.mark.parametrize(("name", "key", "unit"), [
+    ("position-axis", "controller.reference.speed", "rad/s"),
+    ("position-axis", "controller.reference.moves.0.to", "rad"),
+    ("speed-axis", "controller.reference.mean", "rad/s"),
+    ("speed-axis", "controller.reference.steps.0.height", "rad/s"),
+    ("ball-screw-axis", "controller.reference.speed", "m/s"),
+    ("gantry-two-screws", "controllers.left_servo.reference.moves.0.to", "m"),
+])  # fmt: skip
 def test_the_unit_of_a_reference_is_that_of_its_kind(name: str, key: str, unit: str) -> None:
     """`mean` is an angle or a speed, and `speed` a number of moves or a reference itself."""
     assert unit_for(lm.load(name), key) == unit

@@ -186,13 +186,10 @@ test_what_does_not_fit_is_refused = refusals_of(
     ({"efficiency": 1.2}, "controller.inverse_model.efficiency"),
     ({"loss_factor": 7.0, "loss_adaptation": {"rate": 1.0}}, "controller.inverse_model: outside the limits"),
     ({"loss_adaptation": {"rate": 1.0, "limits": (2.0, 1.0)}}, "controller.inverse_model: which must rise"),
-    (
-        {"friction_adaptation": {"rate": 1.0, "limits": (0.1, 0.2)}},
-        "controller.inverse_model.friction_adaptation.limits: leave out the friction of the drive",
-    ),
+    ({"friction_adaptation": {"rate": 1.0, "limits": (0.1, 0.2)}}, "controller.inverse_model.friction_adaptation.limits: leave out the friction of the drive"),
     ({"loss_adaptation": {"rate": "1 N*m"}}, "controller.inverse_model.loss_adaptation.rate"),
     ({"load_observer": {"input_time": 0.0, "load_time": 1.0}}, "controller.inverse_model.load_observer.input_time"),
-)
+)  # fmt: skip
 
 
 def test_a_gap_needs_a_rate_and_a_train_one_gear() -> None:

@@ -22,8 +22,6 @@ def at_end(result: Any, name: str) -> float:
 
 
 # --- a stop that takes others along ---
-
-
 def flywheel(inertia: float, stiffness: float | None, beside: int = 0) -> lm.Scenario:
     """A worm that locks as its motor reverses; a flywheel behind a freewheel, which it has left behind, catches up then.
 
@@ -86,8 +84,6 @@ def test_shafts_that_an_event_does_not_reach_take_no_part_in_its_search() -> Non
 
 
 # --- a given motion against a gear that locks itself ---
-
-
 def against(stiffness: float | None) -> lm.Scenario:
     mesh = {"kind": "rigid"} if stiffness is None else {"kind": "linear", "stiffness": stiffness}
     return lm.Scenario(
@@ -158,8 +154,6 @@ def test_with_a_stiffness_that_motion_winds_the_gear_up() -> None:
 
 
 # --- the search itself ---
-
-
 def test_two_torques_over_one_angle_are_their_sum() -> None:
     """The shaft turns back near the angle 0, where both laws begin a turn: their sum is one sine."""
     laws = {"a": (0.03, 0.0), "b": (0.1, -2.0)}
@@ -241,8 +235,6 @@ def test_samples_of_a_large_train_are_right_though_matrices_are_given_up_between
 
 
 # --- random trains with gears that lock themselves ---
-
-
 def run_locking(number: int, stiffness: float | None = None, seed: int = 1) -> Any:
     tables = locking_train(seed, number, stiffness)
     return lm.simulate(lm.Scenario(**{key: table for key, table in tables.items() if table}))

@@ -125,17 +125,14 @@ def test_weight_of_an_inclined_slide_is_a_load():
     assert falling["lifter_force"].attrs["units"] == "N"
 
 
-@pytest.mark.parametrize(
-    ("drive", "travel"),
-    [
-        (lm.model.Screw(input="a", output="b", lead="10 mm"), 0.01),
-        (lm.model.Screw(input="a", output="b", pitch="5 mm", starts=4), 0.02),
-        (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20), math.pi * 0.04),
-        (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"), math.pi * 0.04 / 0.94247),
-        (lm.model.Belt(input="a", output="b", teeth=20, pitch="5 mm"), 0.1),
-        (lm.model.Belt(input="a", output="b", pulley_diameter="31.83098862 mm"), 0.1),
-    ],
-)
+@pytest.mark.parametrize(("drive", "travel"), [
+    (lm.model.Screw(input="a", output="b", lead="10 mm"), 0.01),
+    (lm.model.Screw(input="a", output="b", pitch="5 mm", starts=4), 0.02),
+    (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20), math.pi * 0.04),
+    (lm.model.Rack(input="a", output="b", module="2 mm", teeth=20, helix_angle="19.5283 deg"), math.pi * 0.04 / 0.94247),
+    (lm.model.Belt(input="a", output="b", teeth=20, pitch="5 mm"), 0.1),
+    (lm.model.Belt(input="a", output="b", pulley_diameter="31.83098862 mm"), 0.1),
+])  # fmt: skip
 def test_travel_to_one_turn(drive, travel):
     """Of catalogues: a rack of module 2 with a helix angle of 19.5283 degrees has 133.33 mm to 20 teeth."""
     assert drive.travel() == pytest.approx(travel, rel=1e-5)
@@ -323,22 +320,19 @@ def test_linear_scale_reads_its_grating_in_steps():
     np.testing.assert_allclose(read, np.round(read), rtol=0.0, atol=1e-6)
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"controller.reference.moves": [{"to": "1 rad"}]}, "controller.reference.moves.0.to"),
-        ({"controller.position.speed_limit": "3 rad/s"}, "controller.position.speed_limit"),
-        ({"controller.encoder.resolution": "1 um", "controller.encoder.bits": 3}, "controller.encoder.resolution"),
-        ({"controller.position_encoder": {"bits": 20}}, "position_encoder.bits: counts a turn"),
-        ({"controller.encoder": {"grating_period": 2e-5}}, "encoder.grating_period: is that of a linear scale"),
-        ({"axis.belt": {"teeth": 20, "pitch": "5 mm"}}, "has screw and belt"),
-        ({"axis.screw.leed": 1.0}, "axis.screw.leed"),
-        ({"axis.slide.mass": "3 N"}, "axis.slide.mass"),
-        ({"axis.sled": {}}, "axis.sled"),
-        ({"load": {}}, "is not allowed beside [axis]"),
-        ({"command": 1.0}, "both turn the motor"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"controller.reference.moves": [{"to": "1 rad"}]}, "controller.reference.moves.0.to"),
+    ({"controller.position.speed_limit": "3 rad/s"}, "controller.position.speed_limit"),
+    ({"controller.encoder.resolution": "1 um", "controller.encoder.bits": 3}, "controller.encoder.resolution"),
+    ({"controller.position_encoder": {"bits": 20}}, "position_encoder.bits: counts a turn"),
+    ({"controller.encoder": {"grating_period": 2e-5}}, "encoder.grating_period: is that of a linear scale"),
+    ({"axis.belt": {"teeth": 20, "pitch": "5 mm"}}, "has screw and belt"),
+    ({"axis.screw.leed": 1.0}, "axis.screw.leed"),
+    ({"axis.slide.mass": "3 N"}, "axis.slide.mass"),
+    ({"axis.sled": {}}, "axis.sled"),
+    ({"load": {}}, "is not allowed beside [axis]"),
+    ({"command": 1.0}, "both turn the motor"),
+])  # fmt: skip
 def test_bad_input_in_the_short_form_is_refused_with_its_keys(changes, message):
     told = refused(lambda: axis(**changes))
     assert message in told
@@ -421,7 +415,6 @@ def test_the_tutorial_prints_what_the_run_prints(tmp_path):
 
 
 # --- one speed of what is tied together ---
-
 FALLING = {
     "shafts": {"motor": {"inertia": 1e-4}, "screw": {}},
     "slides": {"head": {"mass": 30.0, "inclination": "90 deg"}},
@@ -433,14 +426,11 @@ FALLING = {
 TRAVEL = 0.02 / (2.0 * math.pi)
 
 
-@pytest.mark.parametrize(
-    "initial",
-    [
-        {"slide_speeds": {"head": -0.3}},
-        {"speeds": {"motor": -2.0 * 0.3 / TRAVEL}},
-        {"speeds": {"screw": -0.3 / TRAVEL}, "slide_speeds": {"head": -0.3}},
-    ],
-)
+@pytest.mark.parametrize("initial", [
+    {"slide_speeds": {"head": -0.3}},
+    {"speeds": {"motor": -2.0 * 0.3 / TRAVEL}},
+    {"speeds": {"screw": -0.3 / TRAVEL}, "slide_speeds": {"head": -0.3}},
+])  # fmt: skip
 def test_one_speed_of_a_rigid_train_says_the_others(initial):
     """30 kg fall behind a screw that gives back 2 - 1/0.9 of the force: a = g/(1 + J (i/s)²/(m eta_b))."""
     result = lm.simulate(lm.Scenario(**FALLING, initial=initial))

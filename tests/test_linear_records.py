@@ -101,24 +101,21 @@ def test_what_is_given_takes_the_place_of_what_says_the_same() -> None:
     assert "rated_force" not in motor and motor["pole_pitch"] == 0.014
 
 
-@pytest.mark.parametrize(
-    ("table", "text", "match"),
-    [
-        ("screws", 'from = "rexroth-25x10rx3-i5"', 'screws.part.from: screw "rexroth-25x10rx3-i5" is not in .* mean rexroth'),
-        ("screws", 'from = "elatech-at5-25"', "is a belt; a screw is wanted here"),
-        ("screws", "from = 3", "screws.part.from: 3 must be the name of a record"),
-        ("screws", 'from = "hiwin-r25-10t3-deb"', "lacks nut_stiffness, see HIWIN.*give screws.part.nut_stiffness"),
-        ("screws", 'from = "thk-bnf2505-5"\nnut_preload = 3', "screws.part.nut_preload: scales .* has none"),
-        ("screws", 'from = "thk-bnfn2505-5"\nnut_preload = "-3 N"', 'screws.part.nut_preload: "-3 N" must be greater'),
-        ("screws", 'from = "thk-bnfn2505-5"\nstifness = 3', "screws.part.stifness: is not known; did you mean stiffness"),
-        ("screws", 'lead = "5 mm"\nnut_preload = "3 N"', "acts on a record; give screws.part.from"),
-        ("screws", 'from = "thk-bnfn2505-5"\nsupported_length = "-1 m"', "screws.part.supported_length"),
-        ("racks", 'from = "sati-cr28100"', r"give racks.part.teeth \(of the pinion\) beside"),
-        ("belts", 'from = "elatech-at5-25"', r"belts.part.teeth \(of the pulley\) and belts.part.free_lengths"),
-        ("belts", 'from = "synchroflex-at-10-25"\nteeth = 20', "lacks specific_stiffness"),
-        ("linear_motors", 'from = "none.toml"', "no such file"),
-    ],
-)
+@pytest.mark.parametrize(("table", "text", "match"), [
+    ("screws", 'from = "rexroth-25x10rx3-i5"', 'screws.part.from: screw "rexroth-25x10rx3-i5" is not in .* mean rexroth'),
+    ("screws", 'from = "elatech-at5-25"', "is a belt; a screw is wanted here"),
+    ("screws", "from = 3", "screws.part.from: 3 must be the name of a record"),
+    ("screws", 'from = "hiwin-r25-10t3-deb"', "lacks nut_stiffness, see HIWIN.*give screws.part.nut_stiffness"),
+    ("screws", 'from = "thk-bnf2505-5"\nnut_preload = 3', "screws.part.nut_preload: scales .* has none"),
+    ("screws", 'from = "thk-bnfn2505-5"\nnut_preload = "-3 N"', 'screws.part.nut_preload: "-3 N" must be greater'),
+    ("screws", 'from = "thk-bnfn2505-5"\nstifness = 3', "screws.part.stifness: is not known; did you mean stiffness"),
+    ("screws", 'lead = "5 mm"\nnut_preload = "3 N"', "acts on a record; give screws.part.from"),
+    ("screws", 'from = "thk-bnfn2505-5"\nsupported_length = "-1 m"', "screws.part.supported_length"),
+    ("racks", 'from = "sati-cr28100"', r"give racks.part.teeth \(of the pinion\) beside"),
+    ("belts", 'from = "elatech-at5-25"', r"belts.part.teeth \(of the pulley\) and belts.part.free_lengths"),
+    ("belts", 'from = "synchroflex-at-10-25"\nteeth = 20', "lacks specific_stiffness"),
+    ("linear_motors", 'from = "none.toml"', "no such file"),
+])  # fmt: skip
 def test_bad_use_names_file_key_and_remedy(tmp_path: Path, table: str, text: str, match: str) -> None:
     path = axis(tmp_path, table, text)
     assert refused(lambda: lm.load(path), match=match).startswith(f"{path}: key {table}.part")
@@ -134,17 +131,14 @@ def test_own_sheets_from_templates_can_be_used_as_they_are(tmp_path: Path) -> No
         assert "It can be simulated: all data." in record_text(str(tmp_path / "own.toml"))
 
 
-@pytest.mark.parametrize(
-    ("kind", "changes", "match"),
-    [
-        ("screw", {"lead": "5 kg"}, 'key lead: "5 kg" has the unit of something else'),
-        ("screw", {"lead": "-5 mm"}, "greater than 0"),
-        ("screw", {"dynamic_capacty": 3}, "did you mean dynamic_capacity"),
-        ("rack", {"kind": "bent"}, "kind"),
-        ("belt", {"width": 0}, "width"),
-        ("linear_motor", {"peak_force": "3 N*m"}, "peak_force"),
-    ],
-)
+@pytest.mark.parametrize(("kind", "changes", "match"), [
+    ("screw", {"lead": "5 kg"}, 'key lead: "5 kg" has the unit of something else'),
+    ("screw", {"lead": "-5 mm"}, "greater than 0"),
+    ("screw", {"dynamic_capacty": 3}, "did you mean dynamic_capacity"),
+    ("rack", {"kind": "bent"}, "kind"),
+    ("belt", {"width": 0}, "width"),
+    ("linear_motor", {"peak_force": "3 N*m"}, "peak_force"),
+])  # fmt: skip
 def test_a_bad_sheet_ends_in_one_clear_line(kind: str, changes: dict, match: str) -> None:
     assert refused(lambda: parse_sheets({kind: [{"name": "x", **changes}]}, "my.toml"), match=match).startswith(f"my.toml: {kind} x: ")
 
@@ -160,8 +154,6 @@ def test_the_list_filters_by_lead_and_force() -> None:
 
 
 # --- the data against each other ---
-
-
 def test_capacities_and_stiffness_of_screws_grow_with_their_turns() -> None:
     """ISO 3408: C goes with the turns to the power 0.86; the stiffness at a preload in proportion to C so with 2/3 + 0.86/3.
 

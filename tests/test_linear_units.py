@@ -154,17 +154,13 @@ def test_what_a_description_for_other_programs_names_has_none() -> None:
     assert rotary_in("\n".join(scenario.core().ledger_names())) == []
 
 
-@pytest.mark.parametrize(
-    ("changes", "message"),
-    [
-        ({"slides.other.mass": 1.0}, "key slides.other: is moved by nothing: no motor, gear or load force acts on it"),
-        ({"initial.slide_speeds.table": "1 rad/s"}, "such as"),
-        ({"slides.table.end_stops.lower": "-1 rad"}, "slides.table.end_stops.lower"),
-        ({"linear_motors.drive.rated_force": "3 N m"}, "linear_motors.drive.rated_force"),
-        ({"mass_matrices.m": {"shafts": ["table"], "matrix": [[1.0]]}},
-         "key mass_matrices.m: holds the mass of slide 'table', which has one of its own, 10 kg"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changes", "message"), [
+    ({"slides.other.mass": 1.0}, "key slides.other: is moved by nothing: no motor, gear or load force acts on it"),
+    ({"initial.slide_speeds.table": "1 rad/s"}, "such as"),
+    ({"slides.table.end_stops.lower": "-1 rad"}, "slides.table.end_stops.lower"),
+    ({"linear_motors.drive.rated_force": "3 N m"}, "linear_motors.drive.rated_force"),
+    ({"mass_matrices.m": {"shafts": ["table"], "matrix": [[1.0]]}}, "key mass_matrices.m: holds the mass of slide 'table', which has one of its own, 10 kg"),
+])  # fmt: skip
 def test_messages_about_slides_have_none_but_what_was_given(changes: dict[str, Any], message: str) -> None:
     tables = tomllib.loads(AXIS + COMMAND + RUN)
     set_values(tables, changes.items())

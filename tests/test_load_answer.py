@@ -143,8 +143,6 @@ def test_wrong_use_of_an_answer_is_one_line(shaft: str, message: str) -> None:
 
 
 # --- snapshots ---
-
-
 @pytest.mark.parametrize("path", ALL_SCENARIOS, ids=lambda p: p.stem)
 def test_a_snapshot_brings_back_every_bit(path: Path) -> None:
     simulation = lm.Simulation(lm.load(path))

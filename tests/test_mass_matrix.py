@@ -297,8 +297,6 @@ def test_linear_models_and_sensitivities_take_the_matrix() -> None:
 
 
 # --- step by step ---
-
-
 def test_steps_with_the_matrix_of_the_train_have_the_bits_of_steps_without() -> None:
     train = scenario()
     one, other = lm.Simulation(train), lm.Simulation(train)
@@ -354,15 +352,12 @@ def test_freezing_the_pose_has_an_error_of_the_step() -> None:
         assert fine == pytest.approx(0.5 * coarse, rel=0.1)
 
 
-@pytest.mark.parametrize(
-    ("matrix", "message"),
-    [
-        ({"arm": [[1.0, 2.0], [2.0, 1.0]]}, "mass_matrix.arm: is not positive definite"),
-        ({"leg": [[1.0]]}, "mass_matrix..leg.: is none of this train; the mass matrices are arm"),
-        ([[1.0]], "is no dictionary"),
-        ({"arm": "heavy"}, "mass_matrix.arm: "),
-    ],
-)
+@pytest.mark.parametrize(("matrix", "message"), [
+    ({"arm": [[1.0, 2.0], [2.0, 1.0]]}, "mass_matrix.arm: is not positive definite"),
+    ({"leg": [[1.0]]}, "mass_matrix..leg.: is none of this train; the mass matrices are arm"),
+    ([[1.0]], "is no dictionary"),
+    ({"arm": "heavy"}, "mass_matrix.arm: "),
+])  # fmt: skip
 def test_a_step_with_no_mass_matrix_is_refused_and_changes_nothing(matrix: Any, message: str) -> None:
     simulation = lm.Simulation(scenario())
     simulation.advance(0.1, shoulder_load_torque=-1.0)

@@ -167,21 +167,18 @@ def test_pairs_and_contact_ratio_say_the_same() -> None:
     assert turned.curve() == (period, pytest.approx([0.0, 0.4 * period]), [FEWER, 1.0])
 
 
-@pytest.mark.parametrize(
-    ("mesh", "said"),
-    [
-        ({"teeth": 20}, "contact_ratio and fewer_pairs, or pairs"),
-        ({"teeth": 20, "contact_ratio": 1.5}, "give both"),
-        (MESH | {"pairs": [[0.0, 1.0]]}, "or pairs in place of both"),
-        (MESH | {"contact_ratio": 2.0}, "number of pairs never changes"),
-        ({"teeth": 20, "pairs": [[0.1, 1.0]]}, "the first must be 0"),
-        ({"teeth": 20, "pairs": [[0.0, 1.0], [0.6, 0.7], [0.5, 0.8]]}, "shares must rise"),
-        ({"teeth": 20, "pairs": [[0.0, 1.0], [1.0, 0.7]]}, "below 1"),
-        ({"teeth": 0, "pairs": [[0.0, 1.0]]}, "teeth"),
-        ({"teeth": 20, "pairs": [[0.0, 0.0]]}, "pairs"),
-        (MESH | {"fewer_pairs": 1.2}, "fewer_pairs"),
-    ],
-)
+@pytest.mark.parametrize(("mesh", "said"), [
+    ({"teeth": 20}, "contact_ratio and fewer_pairs, or pairs"),
+    ({"teeth": 20, "contact_ratio": 1.5}, "give both"),
+    (MESH | {"pairs": [[0.0, 1.0]]}, "or pairs in place of both"),
+    (MESH | {"contact_ratio": 2.0}, "number of pairs never changes"),
+    ({"teeth": 20, "pairs": [[0.1, 1.0]]}, "the first must be 0"),
+    ({"teeth": 20, "pairs": [[0.0, 1.0], [0.6, 0.7], [0.5, 0.8]]}, "shares must rise"),
+    ({"teeth": 20, "pairs": [[0.0, 1.0], [1.0, 0.7]]}, "below 1"),
+    ({"teeth": 0, "pairs": [[0.0, 1.0]]}, "teeth"),
+    ({"teeth": 20, "pairs": [[0.0, 0.0]]}, "pairs"),
+    (MESH | {"fewer_pairs": 1.2}, "fewer_pairs"),
+])  # fmt: skip
 def test_what_is_no_mesh_is_refused_in_one_line(mesh: dict[str, Any], said: str) -> None:
     gear = {"input": "a", "output": "b", "ratio": 2, "stiffness": {"kind": "linear", "stiffness": 1.0}}
     with pytest.raises(lm.InputError) as refused:

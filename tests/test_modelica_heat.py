@@ -294,7 +294,6 @@ def test_heat_losses() -> None:
 
 
 # --- eddy-current brake ---
-
 PEAK, CRITICAL, COPPER = 100.0, 10.0, 3.920e-3  # N m, rad/s, 1/K
 
 

@@ -98,8 +98,6 @@ def test_logs_without_any_residual_are_not_odd() -> None:
 
 
 # --- a drive ---
-
-
 @pytest.fixture(scope="module")
 def worn(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Backlash grows by 0.1 mrad with the thirteenth log; the fifth one stands still."""
@@ -166,19 +164,16 @@ def test_the_command_writes_a_page_and_ends_with_1_where_something_has_changed(w
     assert run.exit_code == 0, run.output
 
 
-@pytest.mark.parametrize(
-    ("change", "message"),
-    [
-        ({"constant": ["backlash"]}, "backlash in watch and in constant"),
-        ({"watch": {"backlsh": {}}}, "did you mean backlash"),
-        ({"watch": {"backlash": {"max": "1 s"}}}, "monitor.watch.backlash.max"),
-        ({"watch": {"backlash": {"min": 2e-3, "max": 1e-3}}}, "not below max"),
-        ({"model": "stick"}, "no model of the ladder"),
-        ({"order": "days"}, "monitor.order"),
-        ({"baseline": 5, "conditions": ["hours"]}, "give it 6 or more"),
-        ({"watch": {}, "constant": ["backlash", "friction"]}, "none is left to be watched"),
-    ],
-)
+@pytest.mark.parametrize(("change", "message"), [
+    ({"constant": ["backlash"]}, "backlash in watch and in constant"),
+    ({"watch": {"backlsh": {}}}, "did you mean backlash"),
+    ({"watch": {"backlash": {"max": "1 s"}}}, "monitor.watch.backlash.max"),
+    ({"watch": {"backlash": {"min": 2e-3, "max": 1e-3}}}, "not below max"),
+    ({"model": "stick"}, "no model of the ladder"),
+    ({"order": "days"}, "monitor.order"),
+    ({"baseline": 5, "conditions": ["hours"]}, "give it 6 or more"),
+    ({"watch": {}, "constant": ["backlash", "friction"]}, "none is left to be watched"),
+])  # fmt: skip
 def test_a_table_that_cannot_be_used_is_refused(worn: Path, change: dict[str, Any], message: str) -> None:
     path = worn.with_name("other.toml")
     task = write_task(worn.parent, TASK | {"monitor": TASK["monitor"] | change})
@@ -188,8 +183,6 @@ def test_a_table_that_cannot_be_used_is_refused(worn: Path, change: dict[str, An
 
 
 # --- statistics ---
-
-
 def test_the_bayes_factor_is_the_quotient_of_two_integrals() -> None:
     """Over level, scale and size of the change, by sums over fine grids."""
     x = np.array([0.3, -0.4, 0.1, 0.2, 1.9, 2.2])

@@ -88,14 +88,11 @@ def test_few_logs_do_not_decide_on_a_change_and_say_how_many_would(tmp_path: Pat
     assert seen.change is not None and seen.change.alarm is not None
 
 
-@pytest.mark.parametrize(
-    ("worn", "spoil", "code", "words"),
-    [
-        (0, 1.0, 3, "not decided: coulomb: there is no log after the baseline"),
-        (3, 1.7, 3, "not decided: coulomb: none of the 3 logs after the baseline determines it; l05.csv: resid"),
-        (4, 1.0, 1, "does not fit: coulomb: changed since l05.csv"),
-    ],
-)
+@pytest.mark.parametrize(("worn", "spoil", "code", "words"), [
+    (0, 1.0, 3, "not decided: coulomb: there is no log after the baseline"),
+    (3, 1.7, 3, "not decided: coulomb: none of the 3 logs after the baseline determines it; l05.csv: resid"),
+    (4, 1.0, 1, "does not fit: coulomb: changed since l05.csv"),
+])  # fmt: skip
 def test_the_command_ends_with_the_code_of_its_verdict(tmp_path: Path, worn: int, spoil: float, code: int, words: str) -> None:
     path = friction_logs(tmp_path, worn, spoil=spoil)
     run = CliRunner().invoke(app, ["monitor", str(path)])

@@ -17,9 +17,8 @@ mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"'
 
 from robot_arm import ARM, HINGE, RATIO, ROTOR, arm_model, drive, energy, force_on_wall, inertia_and_bias, motor_torques, reference, robot  # noqa: E402  (it needs MuJoCo)
 
+
 # --- accuracy ---
-
-
 @pytest.mark.parametrize("gap", [0.0, 1e-3])
 @pytest.mark.parametrize("step", [5e-3, 20e-3])
 def test_a_joint_of_constant_inertia_moves_as_the_drive_alone(step: float, gap: float) -> None:
@@ -77,8 +76,6 @@ def test_energy_stays_without_damping(stiffness: float, step: float) -> None:
 
 
 # --- rest and contact ---
-
-
 @pytest.mark.parametrize("given", [drive(friction=0.3, bearing=0.5), drive(friction=0.3, hysteresis=0.9)])
 def test_an_arm_that_friction_holds_does_not_creep(given: lm.Drive) -> None:
     arm = robot(2e-3, given)
@@ -98,8 +95,6 @@ def test_a_tip_presses_against_a_wall_as_with_short_steps(stiffness: float, gap:
 
 
 # --- states and wrong use ---
-
-
 def test_states_and_snapshots_bring_robot_and_drives_back() -> None:
     arm = robot(2e-3, drive(gap=1e-3, friction=0.01))
     for _ in range(20):
@@ -260,8 +255,6 @@ def test_a_gearbox_and_an_actuator_of_the_catalogue_are_attached_by_their_names(
 
 
 # --- reduced models ---
-
-
 def rigid(viscous: float, friction: float, efficiency: float = 1.0) -> lm.Drive:
     return lm.Drive(
         motor=lm.Motor(kind="torque_source", rotor_inertia=ROTOR),

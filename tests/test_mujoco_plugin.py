@@ -108,17 +108,14 @@ def test_an_arm_that_friction_holds_does_not_creep(tmp_path: Path) -> None:
     assert np.abs(data.qpos - settled).max() < 1e-12
 
 
-@pytest.mark.parametrize(
-    ("options", "message"),
-    [
-        ({"armature": 0.0}, "lostmotion.drive .*: the joint has the armature 0; give it 0.1, the inertia of the drive"),
-        ({"joint": 'damping="0.1"'}, "the joint has damping, which would act beside the drive"),
-        ({"joint": 'frictionloss="0.1"'}, "the joint has a frictionloss, which would act beside the drive"),
-        ({"joint": 'actuatorfrcrange="-1 1"'}, "the joint has an actuatorfrcrange, which would act beside the drive"),
-        ({"actuator": 'forcerange="-1 1"'}, "the actuator has a forcerange, which would act beside the drive"),
-        ({"key": "/no/such"}, "scenario /no/such: is no file of lostmotion.mujoco.write_drive"),
-    ],
-)
+@pytest.mark.parametrize(("options", "message"), [
+    ({"armature": 0.0}, "lostmotion.drive .*: the joint has the armature 0; give it 0.1, the inertia of the drive"),
+    ({"joint": 'damping="0.1"'}, "the joint has damping, which would act beside the drive"),
+    ({"joint": 'frictionloss="0.1"'}, "the joint has a frictionloss, which would act beside the drive"),
+    ({"joint": 'actuatorfrcrange="-1 1"'}, "the joint has an actuatorfrcrange, which would act beside the drive"),
+    ({"actuator": 'forcerange="-1 1"'}, "the actuator has a forcerange, which would act beside the drive"),
+    ({"key": "/no/such"}, "scenario /no/such: is no file of lostmotion.mujoco.write_drive"),
+])  # fmt: skip
 def test_a_wrong_configuration_ends_in_one_clear_line(options: dict[str, Any], message: str, tmp_path: Path) -> None:
     with pytest.raises((mujoco.FatalError, ValueError), match=message) as raised:
         mujoco.MjData(arm(1e-3, drive(), tmp_path, **options))

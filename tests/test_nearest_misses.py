@@ -162,8 +162,6 @@ def test_a_candidate_whose_run_violates_a_limit_is_run_in_slower_cycles(tmp_path
 
 
 # --- A longer run of a repeated goes on where the shorter one ends ---
-
-
 STEPS = TABLES["controller"]["reference"] | {"moves": [{"to": 1.2}]}  # it goes on from where it ends
 WITHOUT_REST = TABLES["controller"]["reference"] | {"acceleration": 8.0, "moves": [{"to": 0.5}, {"to": 0.0}]}
 JUMPS = {"samples": {"times": [0.0, 0.3, 0.300001, 0.999], "values": [2.0, 2.0, -1.0, -1.0]}}  # also where the cycle ends

@@ -34,8 +34,6 @@ def same(one: xr.Dataset, other: xr.Dataset) -> bool:
 
 
 # --- what a scenario keeps ---
-
-
 @pytest.mark.parametrize("name", [*BOTH_FORMS, "position-axis", "two-motors-one-ring"])
 def test_a_second_run_makes_no_part_and_no_train(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scenario = loaded(name)
@@ -123,8 +121,6 @@ def test_a_large_value_is_kept_while_something_else_holds_it() -> None:
 
 
 # --- arrays ---
-
-
 @pytest.mark.parametrize("name", [*BOTH_FORMS, "position-axis"])
 def test_arrays_are_those_of_the_dataset(name: str) -> None:
     scenario = loaded(name)
@@ -164,8 +160,6 @@ test_another_form_of_the_result_is_refused = refusals_of(
 
 
 # --- the ledger ---
-
-
 @pytest.mark.parametrize("name", [*BOTH_FORMS, "position-axis", "two-motors-one-ring", "field-weakening"])
 def test_a_ledger_asked_for_later_is_that_of_the_run(name: str) -> None:
     scenario = loaded(name)

@@ -111,19 +111,16 @@ def test_a_scenario_names_one_of_several_records(sheets: Path):
         lm.motor(f"{sheets / 'both.toml'}#m-three")
 
 
-@pytest.mark.parametrize(
-    ("given", "says"),
-    [
-        ({"gearbox": "nowhere/"}, "no directory"),
-        ({"gearbox": "sheets/none.toml"}, "there is no such file"),
-        ({"motor": "sheets/cheap.toml"}, "a motor is wanted here"),
-        ({"motors": "sheets/"}, "did you mean motor"),
-        ({"gearbox": 3}, "no name of a gearbox"),
-        ({"gearbox": {"ratio": [1e6, 1e7]}}, "ratio = .*, which no gearbox of the catalogue has; they go from 3 to 1000"),
-        ({"gearbox": {"kind": "planetry"}}, "kind = .*; did you mean planetary"),
-        ({"gearbox": {"kind": "worm", "ratio": [3, 4]}}, r"no gearbox fits: \d+ without kind, \d+ without ratio"),
-    ],
-)
+@pytest.mark.parametrize(("given", "says"), [
+    ({"gearbox": "nowhere/"}, "no directory"),
+    ({"gearbox": "sheets/none.toml"}, "there is no such file"),
+    ({"motor": "sheets/cheap.toml"}, "a motor is wanted here"),
+    ({"motors": "sheets/"}, "did you mean motor"),
+    ({"gearbox": 3}, "no name of a gearbox"),
+    ({"gearbox": {"ratio": [1e6, 1e7]}}, "ratio = .*, which no gearbox of the catalogue has; they go from 3 to 1000"),
+    ({"gearbox": {"kind": "planetry"}}, "kind = .*; did you mean planetary"),
+    ({"gearbox": {"kind": "worm", "ratio": [3, 4]}}, r"no gearbox fits: \d+ without kind, \d+ without ratio"),
+])  # fmt: skip
 def test_what_is_no_candidate_is_refused(sheets: Path, given: dict[str, Any], says: str):
     assert len(refused(lambda: task_with(sheets, {}, **({"gearbox": "sheets/", "motor": "sheets/"} | given)), match=says)) < 400
 
@@ -174,8 +171,6 @@ def test_a_record_without_the_datum_is_listed_apart(sheets: Path, tmp_path: Path
 
 
 # --- torque sources, and gearboxes whose losses are estimated ---
-
-
 def test_torque_sources_are_ranked_by_mechanical_energy(sheets: Path, tmp_path: Path):
     smooth = {"controller": SMOOTH, "candidates": {"gearbox": "sheets/both.toml", "motor": "sheets/both.toml#m-one"}}
     kept = {key: value for key, value in TABLES.items() if key not in ("vary", "motor")}
@@ -233,15 +228,12 @@ def peak(losses: float) -> float:
     return load * (1.0 + losses * (1.0 / EFFICIENCY - 1.0)) + OWN * 30.0 * ACCELERATION
 
 
-@pytest.mark.parametrize(
-    ("limit", "nominal", "says"),
-    [
-        (1.2 * peak(3.0), "", HOLDS),
-        (0.5 * (peak(1.0) + peak(3.0)), "", "fits with the least losses of its kind, violates motor_peak_torque with the largest"),
-        (0.98 * peak(1.0), "motor_peak_torque", "fits with the least losses"),
-        (0.9 * peak(0.2), "motor_peak_torque", HOLDS),
-    ],
-)
+@pytest.mark.parametrize(("limit", "nominal", "says"), [
+    (1.2 * peak(3.0), "", HOLDS),
+    (0.5 * (peak(1.0) + peak(3.0)), "", "fits with the least losses of its kind, violates motor_peak_torque with the largest"),
+    (0.98 * peak(1.0), "motor_peak_torque", "fits with the least losses"),
+    (0.9 * peak(0.2), "motor_peak_torque", HOLDS),
+])  # fmt: skip
 def test_a_verdict_is_marked_with_the_range_that_it_survives(limit: float, nominal: str, says: str):
     task = estimated(limit)
     rows = run_axes(task, task.parameters(0, 1), 1)

@@ -59,7 +59,6 @@ def test_extras_and_metadata() -> None:
 
 
 # --- missing libraries ---
-
 OPTIONAL = ("scipy", "pyarrow", "h5netcdf", "h5py", "jinja2", "control", "SALib", "distributed", "dask")
 
 
@@ -142,8 +141,6 @@ def test_in_python_too() -> None:
 
 
 # --- building ---
-
-
 @pytest.mark.parametrize("strict", [False, True])
 def test_warnings_are_errors_in_our_own_builds_only(tmp_path: Path, strict: bool) -> None:
     tools = Path(sys.executable).parent

@@ -260,17 +260,14 @@ def test_a_bare_angle_of_view_is_printed_back_with_its_unit() -> None:
     assert "--view motor: 0.02 rad (1.15 deg)" in done.output
 
 
-@pytest.mark.parametrize(
-    ("scenario", "options", "said"),
-    [
-        ("paper-2dof-nl-small", {}, "no sampled controller"),
-        ("speed-axis", {}, "not what an axis points by"),
-        ("tracking-loss-map", {"after": 30.0}, "less than the duration"),
-        ("tracking-loss-map", {"view": {"moter": 0.1}}, "moter"),
-        ("tracking-loss-map", {"view": {"motor": -0.1}}, "above 0"),
-        ("tracking-loss-map", {"view": {"motor": "5 kg"}}, "view"),
-    ],
-)
+@pytest.mark.parametrize(("scenario", "options", "said"), [
+    ("paper-2dof-nl-small", {}, "no sampled controller"),
+    ("speed-axis", {}, "not what an axis points by"),
+    ("tracking-loss-map", {"after": 30.0}, "less than the duration"),
+    ("tracking-loss-map", {"view": {"moter": 0.1}}, "moter"),
+    ("tracking-loss-map", {"view": {"motor": -0.1}}, "above 0"),
+    ("tracking-loss-map", {"view": {"motor": "5 kg"}}, "view"),
+])  # fmt: skip
 def test_what_does_not_fit_is_refused(scenario: str, options: dict[str, Any], said: str) -> None:
     refused(lambda: lm.pointing_budget(lm.load(scenario), **options), match=said)
 

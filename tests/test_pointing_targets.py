@@ -111,19 +111,16 @@ def test_a_star_culminates_where_astronomy_says() -> None:
     assert turn[1] == pytest.approx(rate, rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"axis": "azimuth"}, "traverse"),
-        ({"distance": "500 kg"}, "distance"),
-        ({"speed": -3.0}, "speed"),
-        ({"path": "loop"}, "fly_by"),
-        ({"path": "weave", "width": 600.0, "frequency": 1.0}, "not less than its distance"),
-        (TRACK | {"x": (0.0,)}, "lists of different length"),
-        (TRACK | {"duration": 90.0}, "must cover"),
-        (CIRCLE | {"distance": 300.0}, "passes over the station"),
-    ],
-)
+@pytest.mark.parametrize(("change", "said"), [
+    ({"axis": "azimuth"}, "traverse"),
+    ({"distance": "500 kg"}, "distance"),
+    ({"speed": -3.0}, "speed"),
+    ({"path": "loop"}, "fly_by"),
+    ({"path": "weave", "width": 600.0, "frequency": 1.0}, "not less than its distance"),
+    (TRACK | {"x": (0.0,)}, "lists of different length"),
+    (TRACK | {"duration": 90.0}, "must cover"),
+    (CIRCLE | {"distance": 300.0}, "passes over the station"),
+])  # fmt: skip
 def test_what_does_not_fit_is_refused(change: dict[str, Any], said: str) -> None:
     base = FLY_BY if change.get("path", "fly_by") in ("fly_by", "weave", "loop") else {}
     refused(lambda: reference(base | change, change.get("axis", "traverse")), match=said)
@@ -165,8 +162,6 @@ def test_a_path_too_fast_to_follow_is_refused_before_memory_is_taken(speed: floa
 
 
 # --- wind as a torque ---
-
-
 ON_AREA: dict[str, Any] = {"speed": 12.0, "drag_coefficient": 1.3, "area": 2.0, "lever": 0.4, "duration": 100.0, "max_frequency": 4.0}
 WINDS: dict[str, dict[str, Any]] = {
     "davenport": ON_AREA | {"kind": "davenport", "surface_drag": 0.008},
@@ -279,8 +274,6 @@ test_what_does_not_fit_a_wind_is_refused = refusals_of(
 
 
 # --- A camera in the loop and the tracker of its frames ---
-
-
 T = 1e-3
 LAST = slice(-200, -1)  # where the tracker has settled; the tick at the very end is no part of the run
 
@@ -471,24 +464,21 @@ def test_a_state_holds_the_frames_that_are_on_their_way() -> None:
     assert one.read() == other.read()
 
 
-@pytest.mark.parametrize(
-    ("change", "said"),
-    [
-        ({"tracker": None}, "belong together"),
-        ({"camera": None}, "belong together"),
-        ({"camera": {"sample_time": 1.5e-4}}, "camera.sample_time: 0.00015 s is no whole multiple"),
-        ({"camera": {"sample_time": 1e-3, "latency": 1e-4}}, "camera.latency: 0.0001 s is no whole multiple"),
-        ({"camera": {"sample_time": 1e-3, "noise": -1.0}}, "noise"),
-        ({"camera": {"sample_time": 1e-3, "seed": 0.5}}, "seed"),
-        ({"camera": {"sample_time": 1e-3, "pixel_parts": 3}}, "no pixel"),
-        ({"camera": {"sample_time": 1e-3, "pixel": 0.2, "field": 0.1}}, "more than its field"),
-        ({"tracker": {"alpha": 0.5}}, "lacks beta"),
-        ({"tracker": {"alpha": 1.5, "beta": 1.5}}, "its errors grow"),
-        ({"tracker": {"alpha": 0.1, "beta": 0.01, "gamma": 0.1}}, "its errors grow"),
-        ({"tracker": {"tracking_index": 0.1, "beta": 0.1}}, "give one of them"),
-        ({"reference": {"kind": "speed"}, "position": None}, "reference of the speed"),
-    ],
-)
+@pytest.mark.parametrize(("change", "said"), [
+    ({"tracker": None}, "belong together"),
+    ({"camera": None}, "belong together"),
+    ({"camera": {"sample_time": 1.5e-4}}, "camera.sample_time: 0.00015 s is no whole multiple"),
+    ({"camera": {"sample_time": 1e-3, "latency": 1e-4}}, "camera.latency: 0.0001 s is no whole multiple"),
+    ({"camera": {"sample_time": 1e-3, "noise": -1.0}}, "noise"),
+    ({"camera": {"sample_time": 1e-3, "seed": 0.5}}, "seed"),
+    ({"camera": {"sample_time": 1e-3, "pixel_parts": 3}}, "no pixel"),
+    ({"camera": {"sample_time": 1e-3, "pixel": 0.2, "field": 0.1}}, "more than its field"),
+    ({"tracker": {"alpha": 0.5}}, "lacks beta"),
+    ({"tracker": {"alpha": 1.5, "beta": 1.5}}, "its errors grow"),
+    ({"tracker": {"alpha": 0.1, "beta": 0.01, "gamma": 0.1}}, "its errors grow"),
+    ({"tracker": {"tracking_index": 0.1, "beta": 0.1}}, "give one of them"),
+    ({"reference": {"kind": "speed"}, "position": None}, "reference of the speed"),
+])  # fmt: skip
 def test_what_does_not_fit_a_camera_is_refused(change: dict[str, Any], said: str) -> None:
     s = noisy()
     c = {k: v for k, v in (s.controller.model_dump(exclude_none=True) | change).items() if v is not None}

@@ -26,8 +26,6 @@ SMALL = lm.load("paper-2dof-nl-small")
 
 
 # --- scenarios in place of drives ---
-
-
 def test_every_function_that_needs_a_drive_takes_a_scenario() -> None:
     drive, rigid = SMALL.drive(), lm.load("paper-1dof-l-large")
     for takes in (
@@ -56,8 +54,6 @@ def test_a_scenario_brings_its_constant_inputs_and_its_start_along() -> None:
 
 
 # --- pickling, showing ---
-
-
 @pytest.mark.parametrize("path", SCENARIOS, ids=lambda p: p.stem)
 def test_scenarios_drives_and_results_survive_pickling(path) -> None:
     scenario = lm.load(path)
@@ -120,8 +116,6 @@ def test_the_schema_describes_fields_by_their_docstrings() -> None:
 
 
 # --- plots ---
-
-
 def test_a_result_draws_the_figures_of_the_command_line() -> None:
     result, before = lm.simulate(SMALL), dict(mpl.rcParams)
     figure = result.lm.plot()
@@ -174,8 +168,6 @@ def test_long_curves_are_drawn_from_few_points_that_keep_every_peak() -> None:
 
 
 # --- step by step ---
-
-
 def test_reading_a_variable_costs_no_more_than_a_step() -> None:
     simulation = lm.Simulation(SMALL)
     simulation.advance(1e-3, 0.02)
@@ -322,8 +314,6 @@ def test_numbers_of_any_library_advance_as_those_of_python() -> None:
 
 
 # --- what is exported ---
-
-
 def returned_by(thing: object) -> set[str]:
     """Names in the return annotations of a function, or of the public methods and fields of a class."""
     if inspect.isclass(thing):
@@ -372,8 +362,6 @@ def test_help_shows_the_parameters_of_a_part_and_nothing_of_pydantic(name: str) 
 
 
 # --- namespaces ---
-
-
 def test_each_name_has_one_place() -> None:
     attached = {("warp", "attach")}  # to worlds of MuJoCo Warp, as `lm.mujoco.attach` to one of MuJoCo
     listed = FLAT + [name for space in NAMESPACES for name in getattr(lm, space).__all__ if (space, name) not in attached]

@@ -61,11 +61,8 @@ def test_it_begins_where_the_axis_is() -> None:
 test_what_cannot_be_is_refused = refusals(
     (lambda: axis(**{"controller.position.reference_delay": 5.0 * T}), "controller: reference_delay"),
     (lambda: axis(**{"controller.reference_filter": {}}), "controller.reference_filter.time_constant"),
-    (
-        lambda: axis(**{"controller.reference_filter": {"time_constant": 0.0}}),
-        "controller.reference_filter.time_constant: must be greater than 0",
-    ),
-)
+    (lambda: axis(**{"controller.reference_filter": {"time_constant": 0.0}}), "controller.reference_filter.time_constant: must be greater than 0"),
+)  # fmt: skip
 
 
 def test_the_linear_loops_have_it_before_the_outermost_loop_alone() -> None:

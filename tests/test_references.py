@@ -134,7 +134,6 @@ def test_the_duration_of_a_move_is_its_closed_form(move: tuple[float, ...]) -> N
 
 
 # --- references ---
-
 LIST = lm.PositionReference(
     start="10 deg",
     begin="0.1 s",
@@ -310,8 +309,6 @@ def test_references_survive_json_and_pickling(reference) -> None:
 
 
 # --- files ---
-
-
 class Tables(Part):
     """A controller with nothing but a reference."""
 
@@ -361,7 +358,6 @@ def test_the_page_on_references_is_true(capsys: pytest.CaptureFixture[str]) -> N
 
 
 # --- bad input ---
-
 GOOD = {"speed": 1.0, "acceleration": 2.0, "jerk": 30.0, "moves": [{"to": 1.0}]}
 BAD = [
     ({"speed": 0.0}, "speed: 0.0 must be greater than 0"),
@@ -452,7 +448,6 @@ def test_any_series_is_refused_in_one_plain_line_or_passes_through_its_points(ti
 
 
 # --- moves of a given duration ---
-
 COEFFICIENTS = {  # peak speed, acceleration and jerk of a move by 1 in 1 s: VDI 2143-1; R. L. Norton, Cam Design, table 3-3
     "parabola": (2.0, 4.0, None),
     "least_jerk": (2.0, 8.0, 32.0),

@@ -239,8 +239,6 @@ def test_a_page_of_250_logs_stays_below_two_megabytes() -> None:
 
 
 # --- pictures by matplotlib ---
-
-
 def drawn(*charts: panels.Chart, columns: int = 2) -> Any:
     """A picture that has its layout."""
     figure = plots.draw(charts, columns, (9.0, 3.5))

@@ -45,8 +45,6 @@ def load_response(response, amplitude: float) -> np.ndarray:
 
 
 # --- linear ---
-
-
 def test_rigid_drive_follows_the_closed_form_over_four_decades():
     drive = frictionless("1-DOF-L")
     frequencies = np.geomspace(0.1, 1000.0, 9)
@@ -158,8 +156,6 @@ def test_scipy_and_control_get_the_same_model():
 
 
 # --- periodic motion ---
-
-
 def test_shooting_agrees_with_long_transients():
     for amplitude, frequency in ((1.0275, 3.0), (0.025, 5.0), (0.1, 20.0)):
         command = lm.CommandSignal(amplitude=amplitude, frequency=frequency)
@@ -239,8 +235,6 @@ def test_coexisting_motions_and_subharmonics_of_a_load_in_backlash():
 
 
 # --- Coulomb friction, closed forms ---
-
-
 @pytest.mark.parametrize("r", [0.5, 0.8, 1.3, 2.0])
 def test_den_hartogs_oscillator_with_dry_friction(r: float):
     """J. P. Den Hartog, Forced vibrations with combined Coulomb and viscous friction, Trans. ASME 53 (1931) APM-53-9.
@@ -285,8 +279,6 @@ def test_stick_slip_boundary_and_two_stops_of_a_mass_with_dry_friction():
 
 
 # --- the response ---
-
-
 def test_the_result_does_not_depend_on_the_number_of_threads():
     frequencies, amplitudes = np.geomspace(0.3, 30.0, 7), [0.02, 0.3]
     one, two, five = (lm.frequency_response(NONLINEAR, frequencies, amplitudes, threads=n) for n in (1, 2, 5))
@@ -364,27 +356,16 @@ def test_bandwidth_is_where_the_gain_has_fallen_by_three_decibels():
     assert "must be positive" in refused(lambda: lm.response.bandwidth(linear, 0.0))
 
 
-@pytest.mark.parametrize(
-    ("call", "match"),
-    [
-        (lambda: lm.frequency_response(NONLINEAR, [], [1.0]), "at least one"),
-        (lambda: lm.frequency_response(NONLINEAR, [-1.0], [1.0]), "positive"),
-        (lambda: lm.frequency_response(NONLINEAR, [1.0], [0.0]), "positive"),
-        (lambda: lm.frequency_response(NONLINEAR, [1.0], [0.1], source="reference"), "must be command or load_torque"),
-        (lambda: lm.periodic_motion(NONLINEAR, 0.3), "at least one sine"),
-        (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(steps=[{"height": 1.0}])), "mean and sines only"),
-        (
-            lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(amplitude=1.0, frequency=1.0), multiple=0),
-            "must be a whole number above 0",
-        ),
-        (
-            lambda: lm.periodic_motion(
-                NONLINEAR, lm.CommandSignal(sines=[{"amplitude": 1, "frequency": 1}, {"amplitude": 1, "frequency": math.pi}])
-            ),
-            "no common period",
-        ),
-    ],
-)
+@pytest.mark.parametrize(("call", "match"), [
+    (lambda: lm.frequency_response(NONLINEAR, [], [1.0]), "at least one"),
+    (lambda: lm.frequency_response(NONLINEAR, [-1.0], [1.0]), "positive"),
+    (lambda: lm.frequency_response(NONLINEAR, [1.0], [0.0]), "positive"),
+    (lambda: lm.frequency_response(NONLINEAR, [1.0], [0.1], source="reference"), "must be command or load_torque"),
+    (lambda: lm.periodic_motion(NONLINEAR, 0.3), "at least one sine"),
+    (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(steps=[{"height": 1.0}])), "mean and sines only"),
+    (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(amplitude=1.0, frequency=1.0), multiple=0), "must be a whole number above 0"),
+    (lambda: lm.periodic_motion(NONLINEAR, lm.CommandSignal(sines=[{"amplitude": 1, "frequency": 1}, {"amplitude": 1, "frequency": math.pi}])), "no common period"),
+])  # fmt: skip
 def test_bad_questions_get_one_clear_answer(call, match: str):
     with pytest.raises(ValueError, match=match):
         call()
@@ -403,8 +384,6 @@ def test_a_motion_that_does_not_settle_is_reported_and_not_made_up():
 
 
 # --- the command ---
-
-
 def test_the_command_writes_figures_and_tables(tmp_path: Path):
     linear = ROOT / "scenarios" / "paper-2dof-l-large.toml"
     words = ["--amplitudes", "0.01,0.1,1", "--frequencies", "0.5..20:6", "--compare", str(linear), "-o", str(tmp_path / "out")]
@@ -467,21 +446,18 @@ def test_lists_of_values_are_read_alike() -> None:
         refused(lambda text=text: parse_grid(text, "amplitudes"), match=f"^--amplitudes {re.escape(text)}: ")
 
 
-@pytest.mark.parametrize(
-    ("words", "match"),
-    [
-        (["--amplitudes", "a"], "--amplitudes a: must be numbers"),
-        (["--amplitudes", "0.0,1.0"], "above 0"),
-        (["--amplitudes", "1,5"], "may be a list or a decimal comma; write 1.0,5.0 or 1.5"),
-        (["--amplitudes", "0,025"], "has a decimal comma in 0,025; write 0.025"),
-        (["--frequencies", "1,5 Hz..10 Hz:3"], "has a decimal comma"),
-        (["--frequencies", "60 rpm"], "is a speed of rotation, not a frequency"),
-        (["--frequencies", "1..x:3"], "--frequencies 1..x:3"),
-        (["--input", "reference"], "--input reference"),
-        (["--variable", "speed"], "--variable speed"),
-        (["--compare", "none.toml"], "no such file"),
-    ],
-)
+@pytest.mark.parametrize(("words", "match"), [
+    (["--amplitudes", "a"], "--amplitudes a: must be numbers"),
+    (["--amplitudes", "0.0,1.0"], "above 0"),
+    (["--amplitudes", "1,5"], "may be a list or a decimal comma; write 1.0,5.0 or 1.5"),
+    (["--amplitudes", "0,025"], "has a decimal comma in 0,025; write 0.025"),
+    (["--frequencies", "1,5 Hz..10 Hz:3"], "has a decimal comma"),
+    (["--frequencies", "60 rpm"], "is a speed of rotation, not a frequency"),
+    (["--frequencies", "1..x:3"], "--frequencies 1..x:3"),
+    (["--input", "reference"], "--input reference"),
+    (["--variable", "speed"], "--variable speed"),
+    (["--compare", "none.toml"], "no such file"),
+])  # fmt: skip
 def test_the_command_refuses_bad_options_in_one_line(tmp_path: Path, words: list[str], match: str):
     done = lostmotion("response", "paper-1dof-l-large", *words, "-o", "o", cwd=tmp_path)
     assert done.returncode == 1

@@ -161,8 +161,6 @@ def test_a_balance_of_energies_that_rounding_makes_is_not_open(residual: float, 
 
 
 # --- inputs beyond what numbers resolve are refused; an energy ledger that does not close is reported ---
-
-
 NAMED = {path.stem: path for path in ALL_SCENARIOS}
 
 
@@ -222,8 +220,6 @@ def test_a_motion_faster_than_the_clock_is_no_accumulation(ratio: float) -> None
 
 
 # --- trains without motor and load torque move freely, as closed forms say ---
-
-
 @pytest.mark.parametrize("ratio", [-4.0, 1.0, 5.0])
 def test_two_shafts_and_a_compliant_gear_vibrate_freely(ratio: float) -> None:
     """No motor and no load torque: d = d0 cos(w t) with w^2 = k (1/(J_1 i^2) + 1/J_2); motion and ledger to rounding."""
@@ -245,8 +241,6 @@ def test_two_shafts_and_a_compliant_gear_vibrate_freely(ratio: float) -> None:
 
 
 # --- the last sample of a run is its end, also where the duration is no multiple of the sample interval ---
-
-
 END = 2.449489743  # a lift of 3 m with 1 m/s^2
 WINCH: dict[str, Any] = {
     "shafts": {"drum": {"inertia": 0.8125, "friction_torque": 1300.0}},

@@ -185,8 +185,6 @@ def test_any_plausible_sheet_gives_a_passive_map(figures: dict, mu: float, v: fl
 
 
 # --- the virtual test rig for screws ---
-
-
 LEAD = 0.01
 TRAVEL = LEAD / (2 * math.pi)
 
@@ -286,16 +284,13 @@ def test_command_line(tmp_path: Path) -> None:
     assert run(app, ["rig", str(tmp_path / "own.toml"), "-o", str(tmp_path / "own")]).exit_code == 0
 
 
-@pytest.mark.parametrize(
-    ("arguments", "match"),
-    [
-        (["elatech-at5-25"], "elatech-at5-25 is a belt; a gearbox or screw is wanted here"),
-        (["rexroth-25x10rx3"], 'gearbox or screw "rexroth-25x10rx3" is not in the catalogue; did you mean rexroth-25x10'),
-        (["rexroth-25x10rx3-i4", "--logs", "logs"], "--logs: rexroth-25x10rx3-i4 is a screw"),
-        (["rexroth-25x10rx3-i4", "--set", "nut_prelod=3"], "key screw.nut_prelod: is not known; did you mean nut_preload"),
-        (["hiwin-r25-10t3-deb"], "lacks nut_stiffness"),
-    ],
-)
+@pytest.mark.parametrize(("arguments", "match"), [
+    (["elatech-at5-25"], "elatech-at5-25 is a belt; a gearbox or screw is wanted here"),
+    (["rexroth-25x10rx3"], 'gearbox or screw "rexroth-25x10rx3" is not in the catalogue; did you mean rexroth-25x10'),
+    (["rexroth-25x10rx3-i4", "--logs", "logs"], "--logs: rexroth-25x10rx3-i4 is a screw"),
+    (["rexroth-25x10rx3-i4", "--set", "nut_prelod=3"], "key screw.nut_prelod: is not known; did you mean nut_preload"),
+    (["hiwin-r25-10t3-deb"], "lacks nut_stiffness"),
+])  # fmt: skip
 def test_what_cannot_be_measured_is_refused(tmp_path: Path, arguments: list[str], match: str) -> None:
     done = CliRunner().invoke(app, ["rig", *arguments, "-o", str(tmp_path / "sheet")])
     assert isinstance(done.exception, lm.InputError)

@@ -172,17 +172,14 @@ def test_a_reference_that_is_a_reading_to_rounding_is_one(bits: int, count: int)
     ).offset == pytest.approx(1e-6, rel=1e-3)
 
 
-@pytest.mark.parametrize(
-    ("changes", "verdict", "reason"),
-    [
-        ({"controllers/m/speed/integral_gain": 0.0}, "does not hunt", "no integrator winds up"),
-        ({"controllers/m/speed/torque_limit": 1.9}, "does not hunt", "limit of the controller is below"),
-        ({"shafts/rotor/stribeck_speed": 0.1, "shafts/rotor/breakaway_torque": 3.0}, "not decided", "friction of rotor that varies"),
-        ({"controllers/m/position_encoder": {"resolution": 1e-5}}, "not decided", "a position_encoder (give one encoder to both"),
-        ({"controllers/m/position": {"gain": K_V, "integral_gain": 1.0, "dead_zone": [1e-4, 2e-4]}}, "not decided", "a dead zone of the integrator"),
-        ({"controllers/m/position/integral_gain": 1.0}, "not decided", "does not wind up in proportion to the error"),
-    ],
-)  # fmt: skip
+@pytest.mark.parametrize(("changes", "verdict", "reason"), [
+    ({"controllers/m/speed/integral_gain": 0.0}, "does not hunt", "no integrator winds up"),
+    ({"controllers/m/speed/torque_limit": 1.9}, "does not hunt", "limit of the controller is below"),
+    ({"shafts/rotor/stribeck_speed": 0.1, "shafts/rotor/breakaway_torque": 3.0}, "not decided", "friction of rotor that varies"),
+    ({"controllers/m/position_encoder": {"resolution": 1e-5}}, "not decided", "a position_encoder (give one encoder to both"),
+    ({"controllers/m/position": {"gain": K_V, "integral_gain": 1.0, "dead_zone": [1e-4, 2e-4]}}, "not decided", "a dead zone of the integrator"),
+    ({"controllers/m/position/integral_gain": 1.0}, "not decided", "does not wind up in proportion to the error"),
+])  # fmt: skip
 def test_reasons_of_a_sampled_axis_are_named(changes: dict[str, Any], verdict: str, reason: str) -> None:
     certificate = lm.hunting_certificate(rotor(SLIDING, 1e-5, **changes))
     assert certificate.verdict == verdict

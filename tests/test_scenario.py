@@ -191,8 +191,6 @@ def test_an_override_reaches_an_entry_of_a_list() -> None:
 
 
 # --- changes to motor, gearbox and load ---
-
-
 # A catalogue motor and gearbox near their limits, so that every limit is judged.
 BASE = {"load.torque": "2 Nm", "gearbox.limits.peak_output_torque": "1 Nm", "motor.limits.max_current": "10 A"}
 

@@ -45,8 +45,6 @@ def small_limit(monkeypatch: pytest.MonkeyPatch) -> int:
 
 
 # --- no code ---
-
-
 class Command:
     """Touches a file where it is unpickled."""
 
@@ -91,17 +89,14 @@ def no_evaluation(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.usefixtures("no_evaluation")
-@pytest.mark.parametrize(
-    ("formula", "values"),
-    [
-        ("2*X1 + 3", 2.0 * RAW + 3.0),
-        ("X/4", RAW / 4.0),
-        ("sqrt(X)/3 - pi", np.sqrt(np.arange(200.0)) / 3.0 - np.pi),
-        ("pow(X, 2) - X**2 + 1e-3*X", 1e-3 * RAW),
-        ("-log(X + 1) + 2*log10(X + 1)", (2.0 / np.log(10.0) - 1.0) * np.log1p(np.arange(200.0))),
-        ("5", np.full(200, 5.0)),
-    ],
-)
+@pytest.mark.parametrize(("formula", "values"), [
+    ("2*X1 + 3", 2.0 * RAW + 3.0),
+    ("X/4", RAW / 4.0),
+    ("sqrt(X)/3 - pi", np.sqrt(np.arange(200.0)) / 3.0 - np.pi),
+    ("pow(X, 2) - X**2 + 1e-3*X", 1e-3 * RAW),
+    ("-log(X + 1) + 2*log10(X + 1)", (2.0 / np.log(10.0) - 1.0) * np.log1p(np.arange(200.0))),
+    ("5", np.full(200, 5.0)),
+])  # fmt: skip
 def test_algebraic_conversions_are_read_by_a_grammar(tmp_path: Path, formula: str, values: np.ndarray) -> None:
     log = read_log(as_mdf(tmp_path / "log.mf4", {"formula": formula}))
     assert log.channels["position"].values == pytest.approx(values, rel=1e-12, abs=1e-12)
@@ -193,8 +188,6 @@ def test_a_bag_that_computes_its_rows_is_refused(tmp_path: Path, what: str) -> N
 
 
 # --- no other files ---
-
-
 def as_mat73(path: Path, what: str) -> Path:
     h5py = pytest.importorskip("h5py")
     with h5py.File(path, "w", userblock_size=512) as file:
@@ -239,8 +232,6 @@ def test_harmful_hdf5_files_are_refused_as_logs_and_as_files_of_matlab(tmp_path:
 
 
 # --- no more memory than the limit ---
-
-
 def as_parquet(path: Path, groups: int) -> Path:
     """Two columns of a million zeros in each group."""
     import pyarrow as pa

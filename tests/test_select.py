@@ -104,8 +104,6 @@ vary = [{{ key = "gearbox.ratio", values = [{ratios}] }}]
 
 
 # --- rules against closed forms ---
-
-
 @pytest.fixture(scope="module")
 def demand() -> Any:
     reference = task_of(changed()).scenario.controller.reference
@@ -157,8 +155,6 @@ def test_a_required_motion_has_the_losses_of_the_run():
 
 
 # --- gains ---
-
-
 def test_identical_damping_damps_both_pole_pairs_alike():
     J_M, J_L, k = 2.5e-4, 4.2e-3, 36.0
     gains = suited(TwoInertias(J_M, J_L, k), 1.5e-5, 1e-4)
@@ -187,8 +183,6 @@ def test_a_pair_has_the_gains_of_the_rule_of_tune(task: Study):
 
 
 # --- the cycle ---
-
-
 def test_a_cycle_repeats_exactly():
     reference = task_of(changed()).scenario.controller.reference
     three = repeated(reference, CYCLE, 3)
@@ -206,8 +200,6 @@ def test_a_cycle_repeats_exactly():
 
 
 # --- rows ---
-
-
 def test_a_row_is_the_run_of_its_scenario(task: Study, result: Any):
     runs = [k for k in range(task.total) if not math.isnan(float(result["cycles"].values[result["run"].values == k][0]))]
     assert runs
@@ -349,30 +341,25 @@ def test_rows_are_kept_and_the_best_come_first(task: Study, result: Any, tmp_pat
 
 
 # --- what is refused ---
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        ({"tsk": {}}, "key tsk"),
-        ({"task": {}}, "cycle"),
-        ({"task": {"cycle": "0.1 s"}}, "after the cycle of 0.1 s; lengthen task.cycle"),
-        ({"task": {"cycle": "1 s", "max_settling_time": "1 s"}}, "settling_window"),
-        ({"task": {"cycle": "1 s", "max_reversal_error": "1 s"}}, "max_reversal_error"),
-        ({"load": 3}, r"key load: must be a table \[load\]"),
-        ({"controller": {"reference": {"kind": "speed", "mean": 1.0}}}, "position"),
-        ({"controller": TABLES["controller"] | {"speed": {"gain": 1.0}}}, "controller.speed.gain: follows from the rule"),
-        ({"controller": {"reference": {"kind": "position", "amplitude": 1.0, "frequency": 1.3}}}, "1.3 periods in the cycle"),
-        ({"load": {"inertia": J, "torque": {"steps": [{"height": 1.0}]}}}, r"load.torque.steps: acts once"),
-        ({"vary": [{"key": "load.inertia", "values": [1.0]}]}, "of a task motor and gearbox vary|lacks|motor"),
-        ({"vary": [{"key": "gearbox", "values": ["schaefler-rt1-h-20-100"]}]}, "did you mean schaeffler"),
-        ({"select": {"objectives": {"beauty": "least"}}}, "'beauty' is no column of numbers"),
-        ({"select": {"objectives": {"reversal_error": "least"}}, "controller": ONE_WAY}, "moves .* go one way"),
-        ({"task": {"cycle": "1 s", "max_reversal_error": "1 deg"}, "controller": ONE_WAY}, "moves .* go one way"),
-        ({"task": {"cycle": "1 s"}, "select": {"objectives": {"settling_time": "least"}}}, "needs task.settling_window"),
-        ({"select": 3}, "key select"),
-    ],
-)
+@pytest.mark.parametrize(("change", "says"), [
+    ({"tsk": {}}, "key tsk"),
+    ({"task": {}}, "cycle"),
+    ({"task": {"cycle": "0.1 s"}}, "after the cycle of 0.1 s; lengthen task.cycle"),
+    ({"task": {"cycle": "1 s", "max_settling_time": "1 s"}}, "settling_window"),
+    ({"task": {"cycle": "1 s", "max_reversal_error": "1 s"}}, "max_reversal_error"),
+    ({"load": 3}, r"key load: must be a table \[load\]"),
+    ({"controller": {"reference": {"kind": "speed", "mean": 1.0}}}, "position"),
+    ({"controller": TABLES["controller"] | {"speed": {"gain": 1.0}}}, "controller.speed.gain: follows from the rule"),
+    ({"controller": {"reference": {"kind": "position", "amplitude": 1.0, "frequency": 1.3}}}, "1.3 periods in the cycle"),
+    ({"load": {"inertia": J, "torque": {"steps": [{"height": 1.0}]}}}, r"load.torque.steps: acts once"),
+    ({"vary": [{"key": "load.inertia", "values": [1.0]}]}, "of a task motor and gearbox vary|lacks|motor"),
+    ({"vary": [{"key": "gearbox", "values": ["schaefler-rt1-h-20-100"]}]}, "did you mean schaeffler"),
+    ({"select": {"objectives": {"beauty": "least"}}}, "'beauty' is no column of numbers"),
+    ({"select": {"objectives": {"reversal_error": "least"}}, "controller": ONE_WAY}, "moves .* go one way"),
+    ({"task": {"cycle": "1 s", "max_reversal_error": "1 deg"}, "controller": ONE_WAY}, "moves .* go one way"),
+    ({"task": {"cycle": "1 s"}, "select": {"objectives": {"settling_time": "least"}}}, "needs task.settling_window"),
+    ({"select": 3}, "key select"),
+])  # fmt: skip
 def test_bad_tasks_are_refused_in_one_line(change: dict[str, Any], says: str, tmp_path: Path):
     refused(lambda: task_of(changed(**change)), match=says)
     (tmp_path / "task.toml").write_text('[task]\ncycle = "1 m"\n[load]\n[controller]\n')
@@ -380,8 +367,6 @@ def test_bad_tasks_are_refused_in_one_line(change: dict[str, Any], says: str, tm
 
 
 # --- command ---
-
-
 def test_the_command_writes_table_and_front(tmp_path: Path):
     text = (ROOT / "examples" / "select-axis.toml").read_text()
     head, _, tail = text.partition("[[vary]]")

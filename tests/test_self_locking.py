@@ -48,8 +48,6 @@ def verdict(load: float = LOAD, speed: float | None = None, **values: Any) -> Se
 
 
 # --- closed forms ---
-
-
 def test_the_rate_is_that_of_two_inertias_on_the_mesh():
     found = verdict()
     assert found.lowering == "chatters"
@@ -121,8 +119,6 @@ def test_the_rate_is_that_of_the_classic_drive_with_a_dc_motor_and_a_loss_map(sh
 
 
 # --- the solver ---
-
-
 def test_a_disturbance_grows_at_the_rate_that_is_said():
     rate, first = verdict().rate, 1e-5 * LOAD
     d = first / STIFFNESS
@@ -247,8 +243,6 @@ def test_the_least_torque_includes_friction_and_the_losses_up_to_the_motor():
 
 
 # --- the catalogue ---
-
-
 WORMS = [r.name for r in lm.catalogue() if getattr(r, "kind", "") == "worm" and r.losses.efficiency]
 
 
@@ -281,8 +275,6 @@ def test_a_worm_gear_of_the_catalogue_does_what_is_said(name: str):
 
 
 # --- where it is said ---
-
-
 def test_a_gear_of_a_train_is_measured_on_the_rig_as_its_losses_say():
     gear = lm.load("worm-lowering").gears["worm_gear"]
     assert "lacks rated_input_speed and rated_output_torque, by which the test rig" in refused(lambda: lm.test_rig.TestRig(gear))
@@ -325,8 +317,6 @@ def test_explain_says_that_a_gearbox_locks():
 
 
 # --- at rest, and at the start ---
-
-
 def test_the_torque_that_a_stuck_shaft_holds_is_shared_by_bearing_and_gear_as_their_capacities_are():
     tables = worm_tables()
     tables["shafts"]["worm"]["friction_torque"] = 0.12
@@ -342,14 +332,11 @@ def test_the_torque_that_a_stuck_shaft_holds_is_shared_by_bearing_and_gear_as_th
     assert long["gearbox_input_torque"].values[stuck] == pytest.approx(short["input_torque"].values[stuck], rel=1e-12)
 
 
-@pytest.mark.parametrize(
-    ("speeds", "message"),
-    [
-        ({"worm": 100.0, "drum": 0.0}, ".drum: 0 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
-        ({"worm": 100.0, "drum": 2.1}, ".drum: 2.1 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
-        ({"handle": 1.0}, ": handle = 1 rad/s and worm = 0 rad/s do not fit the freewheel hand, whose input cannot be faster"),
-    ],
-)
+@pytest.mark.parametrize(("speeds", "message"), [
+    ({"worm": 100.0, "drum": 0.0}, ".drum: 0 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
+    ({"worm": 100.0, "drum": 2.1}, ".drum: 2.1 rad/s does not fit worm = 100 rad/s .* makes it 2 rad/s"),
+    ({"handle": 1.0}, ": handle = 1 rad/s and worm = 0 rad/s do not fit the freewheel hand, whose input cannot be faster"),
+])  # fmt: skip
 def test_speeds_that_contradict_each_other_are_refused(speeds: dict[str, float], message: str):
     tables = worm_tables(stiffness=None, mass=0.5)
     tables["shafts"]["handle"] = {"inertia": 1e-4}
@@ -361,8 +348,6 @@ def test_speeds_that_contradict_each_other_are_refused(speeds: dict[str, float],
 
 
 # --- the page ---
-
-
 PAGE = (ROOT / "docs" / "self-locking.md").read_text()
 
 

@@ -134,8 +134,6 @@ def test_the_parameter_without_derivatives_is_data_of_the_error() -> None:
 
 
 # --- sensitivities of coupled links with friction and stops ---
-
-
 LINKS: dict[str, Any] = {
     "shafts": {
         "shoulder": {"friction_torque": 0.3, "torque": {"mean": -1.0, "amplitude": 3.0, "frequency": 0.7}},

@@ -43,8 +43,6 @@ def amplitude_of(run: Any, name: str, f: float, begin: float) -> complex:
 
 
 # --- margins ---
-
-
 def assert_margins_by_python_control(found: Any, loop: Any, sample_time: float, within: float) -> None:
     """Gain margin, phase margin and their frequencies, on a dense grid between whose points python-control interpolates."""
     w = np.geomspace(1e-3, 1.0, 4000, endpoint=False) * math.pi / sample_time
@@ -129,8 +127,6 @@ def test_the_proportional_speed_loop_of_a_rigid_drive_is_stable_up_to_its_closed
 
 
 # --- against the simulator ---
-
-
 def test_the_closed_loop_answers_a_sine_as_the_simulator_does() -> None:
     """Feedforward, weight and filters are in."""
     f = 20.0
@@ -184,7 +180,6 @@ def test_the_bandwidth_of_the_sheet_is_where_a_run_has_lost_three_decibels(ratio
 
 
 # --- rules ---
-
 PAPER = TwoInertias(1.47e-5, 16.8 * 1.47e-5, (2.0 * math.pi * 14.8) ** 2 * 16.8 * 1.47e-5)
 
 
@@ -242,8 +237,6 @@ def test_the_sum_of_the_lags_is_the_slope_of_the_phase() -> None:
 
 
 # --- the shipped axis ---
-
-
 @pytest.fixture(scope="module")
 def position_axis() -> Any:
     return lm.load(ROOT / "scenarios" / "position-axis.toml")
@@ -429,8 +422,6 @@ def test_backlash_is_found_as_the_cause_of_a_limit_cycle() -> None:
 
 
 # --- the command ---
-
-
 def test_the_command_writes_one_page_that_needs_nothing_else(tmp_path: Any) -> None:
     done = lostmotion("servo", str(ROOT / "scenarios" / "position-axis.toml"), "--window", "6 arcmin", "-o", "sheet", cwd=tmp_path)
     assert done.returncode == 0, done.stderr
@@ -473,7 +464,6 @@ def test_the_command_names_the_file_that_has_no_controller(tmp_path: Path, comma
 
 
 # --- gains that are kept ---
-
 AXIS = (ROOT / "scenarios" / "position-axis.toml").read_text()
 LONG = """
 title = "A motor on a load"  # by hand
@@ -495,15 +485,12 @@ sample_interval = "1 ms"
 """
 
 
-@pytest.mark.parametrize(
-    ("text", "kept"),
-    [
-        (AXIS, "# of current and speed loop"),
-        (f"{AXIS}\n[controller.feedforward]\ninertia = '1 kg*cm^2'  # measured\n", "# measured"),
-        ('base = "position-axis"  # as shipped\n', "# as shipped"),
-        (LONG, "# by hand"),
-    ],
-)
+@pytest.mark.parametrize(("text", "kept"), [
+    (AXIS, "# of current and speed loop"),
+    (f"{AXIS}\n[controller.feedforward]\ninertia = '1 kg*cm^2'  # measured\n", "# measured"),
+    ('base = "position-axis"  # as shipped\n', "# as shipped"),
+    (LONG, "# by hand"),
+])  # fmt: skip
 def test_a_tuned_file_keeps_comments_and_loads_to_the_tuned_scenario(tmp_path: Any, text: str, kept: str) -> None:
     source, target = tmp_path / "here" / "axis.toml", tmp_path / "there" / "tuned.toml"
     source.parent.mkdir()
@@ -619,8 +606,6 @@ def test_margins_are_marked_where_the_curves_are(sheet: Any) -> None:
 
 
 # --- the search ---
-
-
 def inertia_alone(speed: dict[str, Any]) -> lm.Scenario:
     """An inertia under a speed loop: L(z) = (K_p + K_i T/(z - 1)) T (z + 1)/(2 J z^2 (z - 1)), with one period of delay."""
     return lm.Scenario(

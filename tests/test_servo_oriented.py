@@ -81,17 +81,14 @@ def sine(run: Any, name: str, frequency: float, amplitude: float, ticks: int, be
     return complex(a, b) / amplitude
 
 
-@pytest.mark.parametrize(
-    ("speed", "frequency", "more"),
-    [
-        (150.0, 50.0, ROUND),
-        (500.0, 200.0, {}),
-        (300.0, 50.0, {"encoder_delay": 2}),
-        (300.0, 100.0, {"every": 2, "delay": 0}),
-        (600.0, 20.0, WEAKENED),
-        (600.0, 100.0, {**WEAKENED, "weakening": 0.1, "estimate": {"kind": "difference", "time_constant": 2e-4}}),
-    ],
-)
+@pytest.mark.parametrize(("speed", "frequency", "more"), [
+    (150.0, 50.0, ROUND),
+    (500.0, 200.0, {}),
+    (300.0, 50.0, {"encoder_delay": 2}),
+    (300.0, 100.0, {"every": 2, "delay": 0}),
+    (600.0, 20.0, WEAKENED),
+    (600.0, 100.0, {**WEAKENED, "weakening": 0.1, "estimate": {"kind": "difference", "time_constant": 2e-4}}),
+])  # fmt: skip
 def test_the_speed_loop_answers_a_small_sine_as_the_simulator_does(
     speed: float, frequency: float, more: dict[str, Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -158,8 +155,6 @@ def test_a_speed_without_the_voltage_for_it_is_refused() -> None:
 
 
 # --- from a gearhead's sheet to gains ---
-
-
 SHEET = """
 [[gearbox]]
 name = "planetary-80"

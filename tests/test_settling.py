@@ -22,9 +22,8 @@ from two_mass import k, two_mass
 ARCMIN = math.pi / 10800.0
 MOVES = {"kind": "position", "moves": [{"to": 0.5}], "speed": 4.0, "acceleration": 40.0, "jerk": 2000.0}
 
+
 # --- the window ---
-
-
 def slide_axis(drive: dict[str, Any], **changes: Any) -> lm.Scenario:
     controller = {
         "sample_time": 250e-6,
@@ -77,8 +76,6 @@ def test_an_encoder_of_a_train_that_names_no_shaft_is_on_the_motor() -> None:
 
 
 # --- proof ---
-
-
 def floating(**changes: Any) -> lm.Scenario:
     """A load that nothing brakes, behind a gap of 3 arcmin."""
     loop = {"gain": 1.1, "integral_gain": 45.0}
@@ -225,7 +222,6 @@ def test_the_shipped_axis_says_by_how_much_it_misses_its_window() -> None:
 
 
 # --- random axes against long runs ---
-
 AXES = some(200, 8)
 LONGER = (5.0, 20.0)  # times as long as what was watched
 LONGEST = 6e6  # samples of a controller, of a long run

@@ -353,21 +353,18 @@ def test_a_mount_rests_while_its_worm_crosses_the_backlash() -> None:
     assert rests.max() - 4.0 == pytest.approx(crossing, abs=0.15)  # a step of the field, and the periodic error
 
 
-@pytest.mark.parametrize(
-    ("changes", "rule", "verdict"),
-    [
-        ({}, "lost_steps", "ok"),
-        ({"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8}, "lost_steps", "warning"),
-        ({}, "stepper_torque", "unknown"),
-        ({"axis.motor.supply_voltage": 24.0}, "stepper_torque", "ok"),
-        ({"axis.motor.supply_voltage": 3.0}, "lost_steps", "warning"),
-        ({"axis.motor.supply_voltage": 3.0}, "stepper_torque", "warning"),
-        ({"axis.motor.holding_torque": 0.12, "axis.motor.supply_voltage": 60.0}, "stepper_torque", "caution"),
-        ({"command.stepping.microsteps": 1}, "step_resonance", "caution"),
-        ({}, "step_resonance", "ok"),
-        ({"axis.slide.mass": 5.0}, "inertia_ratio", "caution"),
-    ],
-)
+@pytest.mark.parametrize(("changes", "rule", "verdict"), [
+    ({}, "lost_steps", "ok"),
+    ({"command.stepping.travel.acceleration": 150.0, "command.stepping.travel.speed": 0.8}, "lost_steps", "warning"),
+    ({}, "stepper_torque", "unknown"),
+    ({"axis.motor.supply_voltage": 24.0}, "stepper_torque", "ok"),
+    ({"axis.motor.supply_voltage": 3.0}, "lost_steps", "warning"),
+    ({"axis.motor.supply_voltage": 3.0}, "stepper_torque", "warning"),
+    ({"axis.motor.holding_torque": 0.12, "axis.motor.supply_voltage": 60.0}, "stepper_torque", "caution"),
+    ({"command.stepping.microsteps": 1}, "step_resonance", "caution"),
+    ({}, "step_resonance", "ok"),
+    ({"axis.slide.mass": 5.0}, "inertia_ratio", "caution"),
+])  # fmt: skip
 def test_rules_of_steppers_turn(changes: dict, rule: str, verdict: str) -> None:
     findings = lm.check_drive(lm.load(ROOT / "scenarios" / "stepper-belt-axis.toml", changes))
     assert [f.verdict for f in findings if f.rule == rule] == [verdict]

@@ -145,8 +145,6 @@ test_curves_that_make_no_sense_are_refused = refusals_of(
 
 
 # --- steppers with a winding ---
-
-
 NEMA_17 = stepper(54e-7, 200, 0.44, rated_current=1.7, resistance_phase=1.5, inductance_phase=2.8e-3, supply_voltage=24.0)
 REGULATION = 1e5  # [1/s], as docs/steppers.md states it
 DURATION = 0.02

@@ -151,8 +151,6 @@ def test_a_stepper_under_pulses_has_no_reference_to_point_by():
 
 
 # --- steppers on the doors of the tool ---
-
-
 STEPPERS = [record for record in lm.catalogue() if record.kind == "stepper"]
 
 # Rated voltage of a phase, R I, as the manuals of Trinamic print it beside both [V].

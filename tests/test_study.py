@@ -67,8 +67,6 @@ def rows_of(directory: Path) -> dict[str, list]:
 
 
 # --- rows ---
-
-
 @pytest.mark.parametrize("engine", ["core", "one by one"])
 def test_a_row_equals_the_single_run_bit_for_bit(tmp_path: Path, engine: str):
     vary = list(make().vary)
@@ -185,8 +183,6 @@ def test_values_with_the_unit_of_something_else_are_refused():
 
 
 # --- designs ---
-
-
 def test_designs_cover_what_they_say():
     grid = make(design="grid", runs=None, vary=[{"key": "load.inertia", "grid": [1, 2, 3]}, {"key": "command.phase", "values": [0, 1]}])
     assert grid.total == 6
@@ -227,7 +223,6 @@ def test_coupled_keys_go_together(tmp_path: Path):
 
 
 # --- safety ---
-
 LONG = """
 base = "{base}"
 set = {{ "simulation.duration" = 0.5 }}
@@ -348,19 +343,16 @@ def repair(directory: Path, whole: pa.Table) -> None:
     assert read_table(directory).equals(whole)
 
 
-@pytest.mark.parametrize(
-    ("harm", "said"),
-    [
-        (changed(lambda part: part[:-100]), "part-000001.parquet: is damaged: its checksum differs"),
-        (flip, "part-000001.parquet: is damaged: its checksum differs"),
-        (changed(lambda part: np.random.default_rng(1).bytes(5000)), "part-000001.parquet: is damaged: its checksum differs"),
-        (changed(lambda part: b""), "part-000001.parquet: is damaged: its checksum differs"),
-        (swap, r"part-000000.parquet: is damaged: its checksum differs \(1 more parts are damaged\)"),
-        (swap_with_checksums, "part-000000.parquet: does not hold the runs 0 to 499"),
-        (from_another_study, "part-000001.parquet: (is damaged|belongs to another study)|part-000000.parquet: is damaged"),
-        (forget, "part-000000.parquet: has no line in _checksums.txt"),
-    ],
-)
+@pytest.mark.parametrize(("harm", "said"), [
+    (changed(lambda part: part[:-100]), "part-000001.parquet: is damaged: its checksum differs"),
+    (flip, "part-000001.parquet: is damaged: its checksum differs"),
+    (changed(lambda part: np.random.default_rng(1).bytes(5000)), "part-000001.parquet: is damaged: its checksum differs"),
+    (changed(lambda part: b""), "part-000001.parquet: is damaged: its checksum differs"),
+    (swap, r"part-000000.parquet: is damaged: its checksum differs \(1 more parts are damaged\)"),
+    (swap_with_checksums, "part-000000.parquet: does not hold the runs 0 to 499"),
+    (from_another_study, "part-000001.parquet: (is damaged|belongs to another study)|part-000000.parquet: is damaged"),
+    (forget, "part-000000.parquet: has no line in _checksums.txt"),
+])  # fmt: skip
 def test_damaged_parts_are_named_and_made_again(tmp_path: Path, harm, said: str):
     study = make(design="random", runs=2 * CHUNK + 1)
     directory = lm.study(study, tmp_path / "s")
@@ -548,8 +540,6 @@ def test_progress_rises_to_the_total_and_starts_from_what_is_there(tmp_path: Pat
 
 
 # --- what it shows ---
-
-
 def test_sobol_indices_of_a_closed_form(tmp_path: Path):
     """A free inertia: w(t) = (M - M_Z) t/J with fixed J is linear in both torques, so S = variance share, and no interaction."""
     drive = lm.Scenario(
@@ -630,43 +620,40 @@ peak = "peak(load_speed)"
 """
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "match"),
-    [
-        ('base = "{base}"', "", "key base"),
-        ('base = "{base}"', 'base = "none.toml"', "key base: .*none.toml: there is no such file"),
-        ('"list"', '"lists"', "design"),
-        ("load.inertia", "load.inertai", "does not know"),
-        ("load.inertia", "simulation.duration", "same samples"),
-        ("values = [1, 2]", "", "needs one of values"),
-        ("values = [1, 2]", "values = []", "is empty"),
-        ("values = [1, 2]", 'values = ["1 kg*m"', "TOML"),
-        ("values = [1, 2]", "uniform = [1, 2]", "for which load.inertia needs values"),
-        ("values = [1, 2]", "values = [1]\nuniform = [1, 2]", "needs one of values"),
-        ('design = "list"', 'design = "sobol"', "lacks runs"),
-        ('design = "list"', 'design = "list"\nruns = 3', "leave it out"),
-        ('design = "list"', 'design = "saltelli"\nruns = 3', "power of two"),
-        ("peak(load_speed)", "peak(load_sped)", "neither a result variable"),
-        ("peak(load_speed)", "peak(load_speed", "cannot be read"),
-        ("peak(load_speed)", "energy.gear_loss", "energy.gear_loss is none"),
-        ("peak(load_speed)", "load_speed.__class__", "must not use"),
-        ("peak(load_speed)", "load_speed", r"reduce it, as in peak\(load_speed\)"),
-        ("peak(load_speed)", "load_speed.isel(time=2001)", "sample that a run of 2001 does not have"),
-        ("peak(load_speed)", "load_speed.sel(time=2.5)", "instant outside the 2.0 s"),
-        ('peak = "peak', 'run = "peak', "a name that is taken"),
-        ("[keep]", "[kept]", "kept"),
-        ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
-        ("values = [1, 2]", "values = [true]", "load.inertia: true is not a number$"),
-        ("values = [1, 2]", "grid = [1, 2, 2.5]", r"key vary\[0\]\.grid\[2\]: 2.5 must be a whole number$"),
-        ("values = [1, 2]", "values = [1, inf]", r"key vary\[0\]\.values\[1\]: inf must be a finite number"),
-        ("values = [1, 2]", "grid = [1, 2, 1000000000]", "grid needs 1 to 1000000 values, not 1000000000"),
-        ("values = [1, 2]", "grid = [1, 2, 0]", "grid needs 1 to 1000000 values, not 0"),
-        ("[[vary]]", "[vary]", "key vary: .* must be a list, in square brackets$"),
-        ("[keep]", "[[keep]]", "key keep: .* must be a table$"),
-        ('"peak(load_speed)"', "3", "key keep.peak: 3 must be text, in quotes$"),
-        ('design = "list"', 'design = "lists"', '"lists" must be one of "grid", "list"'),
-    ],
-)
+@pytest.mark.parametrize(("old", "new", "match"), [
+    ('base = "{base}"', "", "key base"),
+    ('base = "{base}"', 'base = "none.toml"', "key base: .*none.toml: there is no such file"),
+    ('"list"', '"lists"', "design"),
+    ("load.inertia", "load.inertai", "does not know"),
+    ("load.inertia", "simulation.duration", "same samples"),
+    ("values = [1, 2]", "", "needs one of values"),
+    ("values = [1, 2]", "values = []", "is empty"),
+    ("values = [1, 2]", 'values = ["1 kg*m"', "TOML"),
+    ("values = [1, 2]", "uniform = [1, 2]", "for which load.inertia needs values"),
+    ("values = [1, 2]", "values = [1]\nuniform = [1, 2]", "needs one of values"),
+    ('design = "list"', 'design = "sobol"', "lacks runs"),
+    ('design = "list"', 'design = "list"\nruns = 3', "leave it out"),
+    ('design = "list"', 'design = "saltelli"\nruns = 3', "power of two"),
+    ("peak(load_speed)", "peak(load_sped)", "neither a result variable"),
+    ("peak(load_speed)", "peak(load_speed", "cannot be read"),
+    ("peak(load_speed)", "energy.gear_loss", "energy.gear_loss is none"),
+    ("peak(load_speed)", "load_speed.__class__", "must not use"),
+    ("peak(load_speed)", "load_speed", r"reduce it, as in peak\(load_speed\)"),
+    ("peak(load_speed)", "load_speed.isel(time=2001)", "sample that a run of 2001 does not have"),
+    ("peak(load_speed)", "load_speed.sel(time=2.5)", "instant outside the 2.0 s"),
+    ('peak = "peak', 'run = "peak', "a name that is taken"),
+    ("[keep]", "[kept]", "kept"),
+    ("values = [1, 2]", "values = [1, 2]\nvalue = 3", "not known"),
+    ("values = [1, 2]", "values = [true]", "load.inertia: true is not a number$"),
+    ("values = [1, 2]", "grid = [1, 2, 2.5]", r"key vary\[0\]\.grid\[2\]: 2.5 must be a whole number$"),
+    ("values = [1, 2]", "values = [1, inf]", r"key vary\[0\]\.values\[1\]: inf must be a finite number"),
+    ("values = [1, 2]", "grid = [1, 2, 1000000000]", "grid needs 1 to 1000000 values, not 1000000000"),
+    ("values = [1, 2]", "grid = [1, 2, 0]", "grid needs 1 to 1000000 values, not 0"),
+    ("[[vary]]", "[vary]", "key vary: .* must be a list, in square brackets$"),
+    ("[keep]", "[[keep]]", "key keep: .* must be a table$"),
+    ('"peak(load_speed)"', "3", "key keep.peak: 3 must be text, in quotes$"),
+    ('design = "list"', 'design = "lists"', '"lists" must be one of "grid", "list"'),
+])  # fmt: skip
 def test_a_bad_study_ends_in_one_clear_line(tmp_path: Path, old: str, new: str, match: str):
     path = tmp_path / "s.toml"
     assert old in GOOD

@@ -166,22 +166,19 @@ def test_directions_and_limits_of_a_selection(tmp_path: Path):
     assert "load.inertia" in outside.why
 
 
-@pytest.mark.parametrize(
-    ("select", "match"),
-    [
-        ('objectives = { enery = "least" }', "'enery' is no column of numbers; did you mean energy"),
-        ('objectives = { gearbox = "least" }', "'gearbox' is no column of numbers"),
-        ('objectives = { energy = "smallest" }', "objectives"),
-        ("objectives = {}", "objectives"),
-        ("limits = {}", "objectives"),
-        ('objectives = { energy = "least" }\nlimits = { energy = {} }', "needs min or max"),
-        ('objectives = { energy = "least" }\nlimits = { energy = { max = "1 m" } }', "select.limits.energy"),
-        ('objectives = { energy = "least" }\nlimits = { energy = { min = 2, max = 1 } }', "min 2 is above max 1"),
-        ('objectives = { energy = "least" }\nlimits = { mass = { max = 1 } }', "'mass' is no column"),
-        ('objectives = { energy = "least" }\ncheck = true', "not known"),
-        ('objectives = { "use of voltage" = "least" }\ndrive_check = false', "'use of voltage' is no column"),
-    ],
-)
+@pytest.mark.parametrize(("select", "match"), [
+    ('objectives = { enery = "least" }', "'enery' is no column of numbers; did you mean energy"),
+    ('objectives = { gearbox = "least" }', "'gearbox' is no column of numbers"),
+    ('objectives = { energy = "smallest" }', "objectives"),
+    ("objectives = {}", "objectives"),
+    ("limits = {}", "objectives"),
+    ('objectives = { energy = "least" }\nlimits = { energy = {} }', "needs min or max"),
+    ('objectives = { energy = "least" }\nlimits = { energy = { max = "1 m" } }', "select.limits.energy"),
+    ('objectives = { energy = "least" }\nlimits = { energy = { min = 2, max = 1 } }', "min 2 is above max 1"),
+    ('objectives = { energy = "least" }\nlimits = { mass = { max = 1 } }', "'mass' is no column"),
+    ('objectives = { energy = "least" }\ncheck = true', "not known"),
+    ('objectives = { "use of voltage" = "least" }\ndrive_check = false', "'use of voltage' is no column"),
+])  # fmt: skip
 def test_a_bad_selection_ends_in_one_clear_line(tmp_path: Path, select: str, match: str):
     text = EXAMPLE.read_text().replace('base = "..', f'base = "{ROOT}')
     path = tmp_path / "s.toml"
@@ -231,8 +228,6 @@ def test_the_points_of_the_pareto_front_are_numbered_within_the_axes_and_named_b
 
 
 # --- studies of axes that follow a target ---
-
-
 CAMERA = {"sample_time": 5e-3, "latency": 10e-3, "noise": 1e-4, "seed": 4}
 
 

@@ -148,7 +148,6 @@ def test_entries_of_lists_and_coupled_keys_vary(tmp_path: Path):
 
 
 # --- records ---
-
 STUDY = """
 base = "belt-before-gearbox"
 set = {{ "simulation.duration" = 0.1 }}
@@ -208,30 +207,25 @@ def test_each_run_of_a_selection_goes_through_the_drive_check(tmp_path: Path):
 
 
 # --- what is refused, before anything runs ---
-
-
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ('key = "gears.bellt.ratio"\nvalues = [1]', "did you mean gears.belt.ratio?"),
-        ('key = "shafts.joint.inertai"\nvalues = [1]', "did you mean shafts.joint.inertia?"),
-        ('key = "gearbox.ratio"\nvalues = [1]', "varies gearbox.ratio, which the base scenario does not know"),
-        ('key = "gears.belt.ratio"\nvalues = ["1 N"]', 'of gears.belt.ratio: "1 N"'),
-        ('key = "shafts.joint.inertia"\nvalues = ["1 kg"]', "has the unit of something else"),
-        ('key = "gears.belt"\nvalues = [1]', "which is a table; vary one of its keys: gears.belt."),
-        ('key = "gears"\nvalues = [1]', "which is a table; vary one of its keys: gears.belt, gears.strain_wave"),
-        ('key = "motors.servo.shaft"\nvalues = [1]', 'which is "motor" and no number'),
-        ('key = "command.sevo"\nvalues = [1]', "did you mean"),
-        ('key = "initial.twists.bell"\nvalues = [1]', "is no gear with a stiffness of this train"),
-        ('key = "initial.speeds.joint"\nrelative = true\nvalues = [1]', "has no value there to multiply"),
-        ('key = "gears.belt.loss_factor"\nvalues = [1]', "belongs beside `gearbox`, but the gears.belt of the base"),
-        ('key = "gears.bellt.gearbox"\nvalues = ["schaeffler-rt1-h-20-100"]', "did you mean gears.belt"),
-        ('key = "gears.belt.gearbox"\nvalues = ["schaeffler-rt1-h-20-101"]', "schaeffler-rt1-h-20-10"),
-        ('key = "simulation.duration"\nvalues = [1]', "all runs must have the same samples"),
-        ('key = "gears.belt.ratio"\nvalues = [1]\n[select]\nobjectives = { pea = "least" }', "is no column of numbers"),
-        ('key = "gears.belt.ratio"\nvalues = [1]\n[trajectories]\nvariables = ["joint_sped"]', "trajectories: has the"),
-    ],
-)
+@pytest.mark.parametrize(("text", "sentence"), [
+    ('key = "gears.bellt.ratio"\nvalues = [1]', "did you mean gears.belt.ratio?"),
+    ('key = "shafts.joint.inertai"\nvalues = [1]', "did you mean shafts.joint.inertia?"),
+    ('key = "gearbox.ratio"\nvalues = [1]', "varies gearbox.ratio, which the base scenario does not know"),
+    ('key = "gears.belt.ratio"\nvalues = ["1 N"]', 'of gears.belt.ratio: "1 N"'),
+    ('key = "shafts.joint.inertia"\nvalues = ["1 kg"]', "has the unit of something else"),
+    ('key = "gears.belt"\nvalues = [1]', "which is a table; vary one of its keys: gears.belt."),
+    ('key = "gears"\nvalues = [1]', "which is a table; vary one of its keys: gears.belt, gears.strain_wave"),
+    ('key = "motors.servo.shaft"\nvalues = [1]', 'which is "motor" and no number'),
+    ('key = "command.sevo"\nvalues = [1]', "did you mean"),
+    ('key = "initial.twists.bell"\nvalues = [1]', "is no gear with a stiffness of this train"),
+    ('key = "initial.speeds.joint"\nrelative = true\nvalues = [1]', "has no value there to multiply"),
+    ('key = "gears.belt.loss_factor"\nvalues = [1]', "belongs beside `gearbox`, but the gears.belt of the base"),
+    ('key = "gears.bellt.gearbox"\nvalues = ["schaeffler-rt1-h-20-100"]', "did you mean gears.belt"),
+    ('key = "gears.belt.gearbox"\nvalues = ["schaeffler-rt1-h-20-101"]', "schaeffler-rt1-h-20-10"),
+    ('key = "simulation.duration"\nvalues = [1]', "all runs must have the same samples"),
+    ('key = "gears.belt.ratio"\nvalues = [1]\n[select]\nobjectives = { pea = "least" }', "is no column of numbers"),
+    ('key = "gears.belt.ratio"\nvalues = [1]\n[trajectories]\nvariables = ["joint_sped"]', "trajectories: has the"),
+])  # fmt: skip
 def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, sentence: str):
     message = refused(lambda: read(tmp_path, f"[[vary]]\n{text}"))
     assert sentence in message

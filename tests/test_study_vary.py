@@ -185,46 +185,43 @@ def test_entries_of_lists_vary_and_lists_of_lists_are_scaled(tmp_path: Path):
     assert rows["lost"][1] < rows["lost"][0]
 
 
-@pytest.mark.parametrize(
-    ("text", "match"),
-    [
-        ('key = "gearbox.stiffness"\nrelative = true\nvalues = [1, 2]', "is a table; vary one of its keys: gearbox.stif"),
-        ('key = "gearbox.stiffness"\nvalues = [1, 2]', "gearbox.stiffness.slopes"),
-        ('key = "command"\nrelative = true\nvalues = [1, 2]', "is a table"),
-        ('key = "load"\nvalues = [1, 2]', "is a table"),
-        ('key = "motor.voltage_limit"\nrelative = true\nvalues = [1, 2]', "no value there to multiply"),
-        ('key = "command.sines.0.amplitude"\nvalues = [1, 2]', "no entry 0; the list has 0 entries"),
-        ('key = "command.ramps.3.rise"\nvalues = [1, 2]', "no entry 3"),
-        ('key = "command.ramps.rise"\nvalues = [1, 2]', "'rise' is no index"),
-        ('key = "command.ramps"\nrelative = true\nvalues = [1, 2]', "is a list; vary its entries"),
-        ('key = "gearbox.stiffness.slopes"\nvalues = [1e4, 2e4]', "is a list; vary its entries"),
-        ('key = "command.chirp"\nvalues = [1, 2]', "does not have; give it there first"),
-        ('key = "motor.kind"\nvalues = [1, 2]', "no number"),
-        ('key = "title"\nvalues = [1, 2]', "no number"),
-        ('key = "gearbox.losses.mirrored"\nvalues = [0, 1]', "no number"),
-        ('key = "load.__class__"\nvalues = [1, 2]', "does not know"),
-        ('key = "drive"\nvalues = [1, 2]', "does not know"),
-        ('key = "gearbox.loss_factor"\nvalues = [1, 2]', "belongs beside `from`, but the gearbox of the base"),
-        ('key = "gearbox"\nvalues = ["schaeffler-rt1-h-20-10"]', "did you mean schaeffler-rt1-h-20-100"),
-        ('key = "gearbox"\nvalues = [1]', "which is no name of a gearbox"),
-        ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "is a motor; a gearbox is wanted here"),
-        ('key = "gearbox"\nvalues = ["none.toml"]', "no such file"),
-        ('key = "gearbox"\nuniform = [0, 1]', "needs? .*values or catalogue"),
-        ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
-        ('keys = ["gearbox", "load.inertia"]\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
-        ('key = "gearbox"\ncatalogue = { colour = "red" }', "colour, which is no datum of a gearbox"),
-        ('key = "gearbox"\ncatalogue = { ratio = 100 }', "list of minimum and maximum"),
-        ('key = "gearbox"\ncatalogue = { ratio = ["1 N", "2 N"] }', "ratio"),
-        ('key = "gearbox"\ncatalogue = { kind = "belt" }', "which no gearbox of the catalogue has"),
-        ('key = "gearbox"\ncatalogue = { kind = 1 }', "must be a text"),
-        ('key = "gearbox"\ncatalogue = "all"', "must be a table"),
-        ('key = "gearbox"\ncatalogue = {}\nvalues = ["schaeffler-rt1-h-20-100"]', "give one of the two"),
-        ('key = "load.inertia"\ncatalogue = {}', "which only gearbox"),
-        ('key = "load.inertia"\nvalues = ["schaeffler-rt1-h-20-100"]', "load.inertia"),
-        ('key = "load.inertai"\nvalues = ["1.5 kg*m^2"]', "does not know .*; did you mean load.inertia"),
-        ('key = "load.inertia"\nrelative = "no"\nvalues = [1, 2]', 'relative: "no"'),
-    ],
-)
+@pytest.mark.parametrize(("text", "match"), [
+    ('key = "gearbox.stiffness"\nrelative = true\nvalues = [1, 2]', "is a table; vary one of its keys: gearbox.stif"),
+    ('key = "gearbox.stiffness"\nvalues = [1, 2]', "gearbox.stiffness.slopes"),
+    ('key = "command"\nrelative = true\nvalues = [1, 2]', "is a table"),
+    ('key = "load"\nvalues = [1, 2]', "is a table"),
+    ('key = "motor.voltage_limit"\nrelative = true\nvalues = [1, 2]', "no value there to multiply"),
+    ('key = "command.sines.0.amplitude"\nvalues = [1, 2]', "no entry 0; the list has 0 entries"),
+    ('key = "command.ramps.3.rise"\nvalues = [1, 2]', "no entry 3"),
+    ('key = "command.ramps.rise"\nvalues = [1, 2]', "'rise' is no index"),
+    ('key = "command.ramps"\nrelative = true\nvalues = [1, 2]', "is a list; vary its entries"),
+    ('key = "gearbox.stiffness.slopes"\nvalues = [1e4, 2e4]', "is a list; vary its entries"),
+    ('key = "command.chirp"\nvalues = [1, 2]', "does not have; give it there first"),
+    ('key = "motor.kind"\nvalues = [1, 2]', "no number"),
+    ('key = "title"\nvalues = [1, 2]', "no number"),
+    ('key = "gearbox.losses.mirrored"\nvalues = [0, 1]', "no number"),
+    ('key = "load.__class__"\nvalues = [1, 2]', "does not know"),
+    ('key = "drive"\nvalues = [1, 2]', "does not know"),
+    ('key = "gearbox.loss_factor"\nvalues = [1, 2]', "belongs beside `from`, but the gearbox of the base"),
+    ('key = "gearbox"\nvalues = ["schaeffler-rt1-h-20-10"]', "did you mean schaeffler-rt1-h-20-100"),
+    ('key = "gearbox"\nvalues = [1]', "which is no name of a gearbox"),
+    ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "is a motor; a gearbox is wanted here"),
+    ('key = "gearbox"\nvalues = ["none.toml"]', "no such file"),
+    ('key = "gearbox"\nuniform = [0, 1]', "needs? .*values or catalogue"),
+    ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
+    ('keys = ["gearbox", "load.inertia"]\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
+    ('key = "gearbox"\ncatalogue = { colour = "red" }', "colour, which is no datum of a gearbox"),
+    ('key = "gearbox"\ncatalogue = { ratio = 100 }', "list of minimum and maximum"),
+    ('key = "gearbox"\ncatalogue = { ratio = ["1 N", "2 N"] }', "ratio"),
+    ('key = "gearbox"\ncatalogue = { kind = "belt" }', "which no gearbox of the catalogue has"),
+    ('key = "gearbox"\ncatalogue = { kind = 1 }', "must be a text"),
+    ('key = "gearbox"\ncatalogue = "all"', "must be a table"),
+    ('key = "gearbox"\ncatalogue = {}\nvalues = ["schaeffler-rt1-h-20-100"]', "give one of the two"),
+    ('key = "load.inertia"\ncatalogue = {}', "which only gearbox"),
+    ('key = "load.inertia"\nvalues = ["schaeffler-rt1-h-20-100"]', "load.inertia"),
+    ('key = "load.inertai"\nvalues = ["1.5 kg*m^2"]', "does not know .*; did you mean load.inertia"),
+    ('key = "load.inertia"\nrelative = "no"\nvalues = [1, 2]', 'relative: "no"'),
+])  # fmt: skip
 def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, match: str):
     path = write(tmp_path, text, base=OVERRUNNING)
     assert refused(lambda: lm.studies.load_study(path), match=match).startswith(str(path))
@@ -247,8 +244,6 @@ def test_a_study_made_in_python_varies_records_as_well(tmp_path: Path):
 
 
 # --- expressions of what a study keeps ---
-
-
 VOCABULARY = vocabulary_of(lm.load("paper-2dof-nl-small"))
 
 
@@ -286,8 +281,6 @@ def test_the_page_on_studies_names_all_that_an_expression_may_use():
 
 
 # --- values ---
-
-
 def sampled() -> dict[str, xr.DataArray]:
     """Three runs of eleven samples, with a gap in one of them."""
     rng = np.random.default_rng(1)
@@ -298,29 +291,26 @@ def sampled() -> dict[str, xr.DataArray]:
     return data
 
 
-@pytest.mark.parametrize(
-    "expression",
-    [
-        "efficiency.where(motor_power > 0).mean('time')",
-        "efficiency.where((motor_power > 0) & ~(load_speed < 0.1) | (twist == 0)).max('time')",
-        "load_speed.where(twist > 0, -1).min('time')",
-        "(2*load_speed**2 - 3/twist + -motor_speed).sum('time')",
-        "load_angle.std('time') / load_angle.median('time')",
-        "load_angle.var('time')**0.5",
-        "load_angle.quantile(0.9, 'time')",
-        "load_speed.differentiate('time').max('time')",
-        "motor_power.integrate('time')",
-        "twist.idxmax('time') - twist.idxmin('time')",
-        "efficiency.count('time') + 2*(load_speed > 0).any('time') - (load_speed > -9).all('time')",
-        "efficiency.fillna(0.5).mean('time')",
-        "twist.clip(-0.5, 0.5).mean('time')",
-        "twist.clip(max=0.5).mean('time')",
-        "efficiency.isnull().mean('time') + efficiency.notnull().mean('time')",
-        "twist.isel(time=-1) - twist.isel(time=0)",
-        "twist.sel(time=0.32, method='nearest')",
-        "(0 < twist).mean('time')",
-    ],
-)
+@pytest.mark.parametrize("expression", [
+    "efficiency.where(motor_power > 0).mean('time')",
+    "efficiency.where((motor_power > 0) & ~(load_speed < 0.1) | (twist == 0)).max('time')",
+    "load_speed.where(twist > 0, -1).min('time')",
+    "(2*load_speed**2 - 3/twist + -motor_speed).sum('time')",
+    "load_angle.std('time') / load_angle.median('time')",
+    "load_angle.var('time')**0.5",
+    "load_angle.quantile(0.9, 'time')",
+    "load_speed.differentiate('time').max('time')",
+    "motor_power.integrate('time')",
+    "twist.idxmax('time') - twist.idxmin('time')",
+    "efficiency.count('time') + 2*(load_speed > 0).any('time') - (load_speed > -9).all('time')",
+    "efficiency.fillna(0.5).mean('time')",
+    "twist.clip(-0.5, 0.5).mean('time')",
+    "twist.clip(max=0.5).mean('time')",
+    "efficiency.isnull().mean('time') + efficiency.notnull().mean('time')",
+    "twist.isel(time=-1) - twist.isel(time=0)",
+    "twist.sel(time=0.32, method='nearest')",
+    "(0 < twist).mean('time')",
+])  # fmt: skip
 def test_an_expression_gives_what_xarray_gives_for_it(expression: str):
     data = sampled()
     expected = eval(expression, {"__builtins__": {}}, dict(data))  # of the list above
@@ -347,7 +337,6 @@ def test_functions_and_chains_of_comparisons_give_what_numpy_gives():
 
 
 # --- what is refused ---
-
 HARMFUL = [
     # methods and attributes that write, load or call
     *("load_speed.to_netcdf('f')", "load_speed.mean('time').to_netcdf('f')", "abs(load_speed).to_netcdf('f')"),

@@ -213,7 +213,6 @@ def test_the_inertia_ratio_has_all_that_is_not_the_rotor_and_the_limit_of_the_ma
 
 
 # --- tasks of scenarios ---
-
 VERTICAL: dict[str, Any] = {
     "axis": {
         "motor": {"kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 2.4, "limits": {"torque_constant": 0.4}},
@@ -290,7 +289,6 @@ def test_lost_motion_without_a_gearbox_is_under_the_rated_torque_of_the_motor() 
 
 
 # --- varied keys ---
-
 VARIED: list[tuple[str, str, list[Any], str]] = [
     ("screw", "slide.mass", ["50 kg", "100 kg"], "motor_torque_rms"),
     ("screw", "slide.inclination", ["0 deg", "30 deg"], "motor_torque_rms"),
@@ -351,18 +349,15 @@ def test_own_keys_vary_beside_each_other_and_relative() -> None:
         assert study.axis_at(row, 2).motor.rotor_inertia == pytest.approx(row[2])
 
 
-@pytest.mark.parametrize(
-    ("vary", "key"),
-    [
-        ({"key": "screw.leed", "values": [1.0]}, "screw.leed"),
-        ({"key": "slide.mass", "values": ["3 m"]}, "slide.mass"),
-        ({"key": "slide.mass", "uniform": [1.0, 2.0]}, "slide.mass"),
-        ({"key": "screw.inertia", "values": [1.0]}, None),
-        ({"key": "task.life", "values": [2.0], "relative": True}, "task.life"),
-        ({"keys": ["slide.mass", "motor.rotor_inertia"], "values": [1.0]}, "slide.mass"),
-        ({"key": "belt.teeth", "values": [20]}, "belt"),
-    ],
-)
+@pytest.mark.parametrize(("vary", "key"), [
+    ({"key": "screw.leed", "values": [1.0]}, "screw.leed"),
+    ({"key": "slide.mass", "values": ["3 m"]}, "slide.mass"),
+    ({"key": "slide.mass", "uniform": [1.0, 2.0]}, "slide.mass"),
+    ({"key": "screw.inertia", "values": [1.0]}, None),
+    ({"key": "task.life", "values": [2.0], "relative": True}, "task.life"),
+    ({"keys": ["slide.mass", "motor.rotor_inertia"], "values": [1.0]}, "slide.mass"),
+    ({"key": "belt.teeth", "values": [20]}, "belt"),
+])  # fmt: skip
 def test_keys_that_cannot_vary_are_refused_by_name(vary: dict[str, Any], key: str | None) -> None:
     tables = {**FORMS["screw"], "vary": [vary]}
     if key is None:

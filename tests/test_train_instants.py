@@ -36,8 +36,6 @@ def chain(inertias: list[float], stiffnesses: list[float], damping: float = 0.0)
 
 
 # --- step by step ---
-
-
 @pytest.mark.parametrize("path", TRAINS, ids=lambda p: p.stem)
 def test_a_train_stepped_follows_its_run(path: Path) -> None:
     scenario = lm.load(path)
@@ -201,8 +199,6 @@ def test_where_a_train_jams_the_message_names_the_contact() -> None:
 
 
 # --- linear models ---
-
-
 def test_an_arm_under_gravity_is_the_pendulum_of_the_textbook() -> None:
     """J w' = -m g r cos(phi0) (phi - phi0) + ..., with its angle one state; chords of sin within 1e-6 are h = 3 mrad long, and
     their slope is off by h^2/6 at 0 and h/2 elsewhere."""
@@ -338,8 +334,6 @@ def test_python_control_gets_the_names_of_a_train() -> None:
 
 
 # --- explanations ---
-
-
 def test_the_worm_holds_by_what_its_angles_say() -> None:
     explanation = lm.explain(WORM, 0.05)
     rotor, worm = explanation.contacts

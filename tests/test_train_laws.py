@@ -290,8 +290,6 @@ def test_a_clutch_does_not_break_away_when_another_contact_stops(solver: str) ->
 
 
 # --- parts of a drive train that nothing joins are solved alone ---
-
-
 MASSES: dict[str, Any] = {
     "shafts": {
         "a": {"inertia": 1e-3, "friction_torque": 0.02},
@@ -391,8 +389,6 @@ def test_bits_do_not_depend_on_whether_parts_run_side_by_side(monkeypatch: pytes
 
 
 # --- ratchets ---
-
-
 J_1, J_2, T, AHEAD = 0.2, 0.5, 3.0, 9.0
 
 
@@ -461,8 +457,6 @@ def test_solvers_and_steps_agree() -> None:
 
 
 # --- stiffness that depends on the direction of twist ---
-
-
 K, BACKWARD, J = 200.0, 2.25, 0.5
 
 

@@ -368,8 +368,6 @@ def test_every_unit_of_the_schema_can_be_written():
 
 
 # --- the same everywhere ---
-
-
 def doors(text: str, tmp_path: Path) -> dict[str, str]:
     """The message about a moment of inertia, wherever it is written."""
     base = ROOT / "scenarios" / "paper-2dof-nl-small.toml"
@@ -397,15 +395,12 @@ def doors(text: str, tmp_path: Path) -> dict[str, str]:
     return found
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ("1,2 kg*m^2", 'has a decimal comma; write "1.2 kg*m^2"'),
-        ("1 000 kg*m^2", 'has separators between thousands; write "1000 kg*m^2"'),
-        ("2**3 kg*m^2", 'is an expression or a range, not one number; write its value, "8 kg*m^2"'),
-        ("3 rpm", 'has the unit of something else (rpm); it must be a value in kg*m^2, such as "1 kg*m^2"'),
-    ],
-)
+@pytest.mark.parametrize(("text", "sentence"), [
+    ("1,2 kg*m^2", 'has a decimal comma; write "1.2 kg*m^2"'),
+    ("1 000 kg*m^2", 'has separators between thousands; write "1000 kg*m^2"'),
+    ("2**3 kg*m^2", 'is an expression or a range, not one number; write its value, "8 kg*m^2"'),
+    ("3 rpm", 'has the unit of something else (rpm); it must be a value in kg*m^2, such as "1 kg*m^2"'),
+])  # fmt: skip
 def test_scenarios_studies_sheets_overrides_and_constructors_refuse_alike(text: str, sentence: str, tmp_path: Path):
     for door, message in doors(text, tmp_path).items():
         assert sentence in message, door

@@ -49,8 +49,6 @@ def test_each_state_has_a_colour_of_its_own_on_pages() -> None:
 
 
 # --- sentences of verdicts against their numbers ---
-
-
 LIMITS = st.floats(1e-6, 1e6)
 MISSED = st.floats(2e-9, 1e4)
 """by how much a limit is exceeded, as a share of it"""
