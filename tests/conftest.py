@@ -12,9 +12,10 @@ import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
-from importlib.util import find_spec
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from multiprocessing import get_context
 from pathlib import Path
+from types import ModuleType
 from typing import Any
 from unittest import mock
 
@@ -75,6 +76,15 @@ def jamming() -> lm.Scenario:
         initial={"speeds": {"worm": -100.0, "drum": -2.0}},
         simulation=run_of(0.1, 1e-3),
     )
+
+
+def module_at(directory: Path, name: str) -> ModuleType:
+    """A file of Python that is in no package, as a module of its own."""
+    spec = spec_from_file_location(f"at_{name}", directory / f"{name}.py")
+    assert spec is not None and spec.loader is not None
+    module = module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
 
 
 def some(every: int, usual: int) -> int:

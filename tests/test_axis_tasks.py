@@ -19,7 +19,7 @@ from lostmotion.sizing.required_motion import duty_torque, input_demand, require
 from lostmotion.sizing.supply import electrical_power, returned, supply_rules
 from lostmotion.studies.runs.axis_pairs import Axes
 from lostmotion.studies.selection.task_file import task_of
-from refusals import refusals_of, refused, refuses
+from refusals import refusals_of, refused
 
 G = 9.80665
 LIMITS = {"continuous_torque": 0.5, "resistance": 1.0, "torque_constant": 0.1, "max_current": 20.0}
@@ -313,8 +313,9 @@ test_bad_tasks_are_refused_in_one_line = refusals_of(
 
 
 def test_a_slide_needs_one_stage():
-    with refuses("slide", match="lacks one of screw, rack, belt"):
-        task_of({key: value for key, value in SLIDE.items() if key != "screw"})
+    refused(
+        lambda: task_of({key: value for key, value in SLIDE.items() if key != "screw"}), "slide", match="lacks one of screw, rack, belt"
+    )
     refused(lambda: task_of(SLIDE | {"belt": {}}), "slide", match="has screw and belt")
     refused(lambda: task_of(SLIDE | {"load": {"inertia": 1.0}}), "load", "slide")
 

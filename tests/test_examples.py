@@ -1,10 +1,9 @@
 """The examples on controllers: a compiled law, a filter from python-control, an environment for reinforcement learning."""
 
-import importlib.util
 import json
 import sys
+from functools import partial
 from pathlib import Path
-from types import ModuleType
 from typing import Any
 
 import matplotlib as mpl
@@ -12,17 +11,9 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, module_at
 
-
-def example(name: str) -> ModuleType:
-    """An example as a module of its own."""
-    spec = importlib.util.spec_from_file_location(f"example_{name}", ROOT / "examples" / f"{name}.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+example = partial(module_at, ROOT / "examples")
 
 
 def test_the_compiled_law_moves_the_axis_as_the_same_in_python() -> None:

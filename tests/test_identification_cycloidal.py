@@ -1,13 +1,12 @@
 """The cycloidal actuators: the shipped extract of their logs gives what the author's thesis states of them."""
 
-import importlib.util
 from types import ModuleType
 
 import numpy as np
 import pytest
 
 import lostmotion as lm
-from conftest import ROOT
+from conftest import ROOT, module_at
 from identification_logs import read_all
 from lostmotion.identification import candidate_models
 from lostmotion.identification.preparation.prepare import prepared
@@ -26,12 +25,7 @@ SPLIT = (0.263, 0.275)
 @pytest.fixture(scope="module")
 def procedure() -> ModuleType:
     """The author's procedure, of the example."""
-    spec = importlib.util.spec_from_file_location("author_procedure", EXAMPLE / "author_procedure.py")
-    assert spec is not None
-    assert spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
+    return module_at(EXAMPLE, "author_procedure")
 
 
 @pytest.fixture(scope="module")

@@ -18,20 +18,13 @@ from lostmotion.identification.rig.servo_goal_limits import shaped
 from lostmotion.identification.task.identification_file import Identification
 from lostmotion.identification.virtual_logs import virtual_log
 from refusals import refused
+from test_firmware import goal_course
 
 NONE: dict[str, Any] = {"held": True, "rate": math.inf, "acceleration": math.inf, "filter_time": 0.0}
 
 
 def step(time: np.ndarray, at: float) -> np.ndarray:
     return np.where(time >= at, 1.0, 0.0)
-
-
-def trapezoid(s: np.ndarray, rate: float, acceleration: float) -> np.ndarray:
-    """Course from 0 to 1 at rest at both ends, with a phase of constant rate."""
-    up, end = rate / acceleration, 1.0 / rate + rate / acceleration
-    s = np.clip(s, 0.0, end)
-    rising, braking = 0.5 * acceleration * s**2, 1.0 - 0.5 * acceleration * (end - s) ** 2
-    return np.where(s < up, rising, np.where(s > end - up, braking, rate * (s - 0.5 * up)))
 
 
 def test_a_limited_step_is_a_ramp() -> None:
@@ -47,7 +40,7 @@ def test_limits_of_rate_and_acceleration_give_the_trapezoid() -> None:
     rate, acceleration = 2.0, 8.0
     fine, course, _ = shaped(time, step(time, 0.2), **NONE | {"rate": rate, "acceleration": acceleration})
     h = float(np.diff(fine)[0])
-    departure = np.abs(course - trapezoid(fine - 0.2, rate, acceleration))
+    departure = np.abs(course - goal_course(1.0, rate, acceleration, fine - 0.2))
     assert np.max(departure) < rate * h + 3.0 * acceleration * h**2
     assert np.max(course) <= 1.0 + acceleration * h**2 and course[-1] == pytest.approx(1.0, abs=1e-9)
     speed = np.diff(course) / h

@@ -21,7 +21,7 @@ from lostmotion.identification.readers.log import Channel, Log
 from lostmotion.identification.readers.log_files import read_log
 from lostmotion.identification.rig.rig_scenario import Rig
 from lostmotion.identification.task.identification_file import Identification, load_identification
-from refusals import refused, refuses
+from refusals import refused
 
 FILE = (SERVO / "identify.toml").read_text()
 SHORT = (
@@ -251,8 +251,10 @@ def test_first_values_means_and_conditions_are_in_si(tmp_path: Path) -> None:
 def test_a_formula_with_a_channel_of_an_unknown_unit_is_refused(tmp_path: Path) -> None:
     task = spring_task(tmp_path, set={"motors.drive.rotor_inertia": "mass + 0*first_raw"})
     channels = {"pos": Channel(np.arange(20.0)), "raw": Channel(np.arange(20.0), "counts")}
-    with refuses(match=r"^log\.csv: channel raw: the unit 'counts' is not known, and a formula"):
-        prepared(task, Log("log.csv", np.arange(20) * 0.01, channels), Rig(task, tmp_path).units)
+    refused(
+        lambda: prepared(task, Log("log.csv", np.arange(20) * 0.01, channels), Rig(task, tmp_path).units),
+        match=r"^log\.csv: channel raw: the unit 'counts' is not known, and a formula",
+    )
 
 
 TRUTH = {"mass": 95.0, "viscous_friction": 200.0, "coulomb_friction": 20.0}

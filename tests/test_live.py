@@ -19,7 +19,7 @@ from lostmotion.live_page import page as live_page
 from lostmotion.live_page.description import describe
 from lostmotion.live_page.references import reference_sliders, reference_view
 from lostmotion.live_page.sliders import LABELS, UNITS, of_signal
-from refusals import refused, refuses
+from refusals import refused
 
 SOURCE = (ROOT / "page" / "index.html").read_text()
 SHORT = {"simulation.duration": "0.1 s"}
@@ -95,8 +95,10 @@ def test_moves_of_a_reference_can_be_changed() -> None:
 def test_without_a_built_page_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_page, "TEMPLATE", tmp_path / "page.html")
     monkeypatch.setattr(live_page, "made_here", lambda *_: None)  # as in an installed package
-    with refuses(match=r"page\.html: is missing.*run `make page`, which needs node"):
-        lm.live(lm.load("paper-2dof-nl-small", SHORT), height=500)
+    refused(
+        lambda: lm.live(lm.load("paper-2dof-nl-small", SHORT), height=500),
+        match=r"page\.html: is missing.*run `make page`, which needs node",
+    )
 
 
 def sliders(scenario: lm.Scenario) -> dict[str, dict]:  # type: ignore[type-arg]

@@ -11,7 +11,7 @@ from scipy.integrate import solve_ivp
 
 import lostmotion as lm
 from conftest import ROOT
-from refusals import refusals_of, refused, refuses
+from refusals import refusals_of, refused
 
 mujoco = pytest.importorskip("mujoco", reason='pip install "lostmotion[mujoco]"')
 
@@ -250,8 +250,10 @@ def test_a_gearbox_and_an_actuator_of_the_catalogue_are_attached_by_their_names(
     drive = lm.mujoco.attach(arm_model(1e-3), {"elbow": "t-motor-ak80-6"}).drives["elbow"]
     assert (drive.motor, drive.gearbox) == lm.actuator("t-motor-ak80-6")
     assert lm.actuator("t-motor-ak80-6", rotor_inertia=1e-4)[0].rotor_inertia == 1e-4
-    with refuses(match=r"actuator from .*: the record lacks rotor_inertia"):
-        lm.mujoco.attach(arm_model(1e-3), {"elbow": "unitree-n5020-16-g1-arm"})
+    refused(
+        lambda: lm.mujoco.attach(arm_model(1e-3), {"elbow": "unitree-n5020-16-g1-arm"}),
+        match=r"actuator from .*: the record lacks rotor_inertia",
+    )
 
 
 # --- reduced models ---
@@ -312,8 +314,7 @@ def test_a_screw_axis_is_described_by_mass_and_forces_at_its_slide() -> None:
     assert found.frictionloss == pytest.approx(0.05 * ratio + 20.0, rel=1e-2)
     assert '<joint name="table" type="slide" armature' in found.mjcf("table")
     assert 'type="prismatic"' in found.urdf("table")
-    with pytest.raises(lm.InputError, match="amplitude"):
-        lm.mujoco.reduce(lm.Scenario(**SCREW), "10 deg", 1.0)
+    refused(lambda: lm.mujoco.reduce(lm.Scenario(**SCREW), "10 deg", 1.0), match="amplitude")
 
 
 def test_what_a_reduction_costs_is_stated_and_no_load_torque_of_a_scenario_is_dropped_from_it() -> None:

@@ -127,8 +127,10 @@ def test_what_does_not_fit_is_refused(change: dict[str, Any], said: str) -> None
 
 
 def test_a_target_and_moves_are_two_things() -> None:
-    with pytest.raises(lm.InputError, match="target and moves"):
-        lm.PositionReference(target=FLY_BY | {"axis": "traverse"}, moves=[{"to": 1.0}], speed=1.0, acceleration=1.0)
+    refused(
+        lambda: lm.PositionReference(target=FLY_BY | {"axis": "traverse"}, moves=[{"to": 1.0}], speed=1.0, acceleration=1.0),
+        match="target and moves",
+    )
 
 
 def test_an_axis_follows_a_target() -> None:

@@ -127,9 +127,3 @@ def test_the_same_bits_for_any_number_of_drives() -> None:
 def test_what_the_kernel_does_not_take_is_refused(use: object, message: str) -> None:
     assert callable(use)
     refused(use, match=message)
-
-
-def test_the_kernel_is_compiled_for_a_graphics_processor(tmp_path: object) -> None:
-    from lostmotion.warp.kernel import advance_kernel
-
-    wp.compile_aot_module(advance_kernel("float32").module, device=None, arch=90, module_dir=tmp_path, use_ptx=True)

@@ -202,10 +202,11 @@ test_what_joints_do_not_take_is_refused = refusals(
 )  # fmt: skip
 
 
-def test_the_kernel_is_compiled_for_a_graphics_processor(tmp_path: object) -> None:
-    from lostmotion.warp.kernel import joint_kernel
+@pytest.mark.parametrize("name", ["advance_kernel", "joint_kernel"])
+def test_the_kernel_is_compiled_for_a_graphics_processor(name: str, tmp_path: object) -> None:
+    from lostmotion.warp import kernel
 
-    wp.compile_aot_module(joint_kernel("float32").module, device=None, arch=90, module_dir=tmp_path, use_ptx=True)
+    wp.compile_aot_module(getattr(kernel, name)("float32").module, device=None, arch=90, module_dir=tmp_path, use_ptx=True)
 
 
 def test_a_slide_behind_a_screw_moves_as_in_attach() -> None:
