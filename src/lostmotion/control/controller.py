@@ -84,7 +84,7 @@ class Controller(ReferenceBlocks):
         wanted = {"position": ("position", "speed"), "speed": ("speed",), "torque": ()}[self.reference.kind]
         if self.firmware is not None:
             wanted = ()
-            self._check_firmware()
+            yield from self._check_firmware()
         if self.law:
             wanted = ()
             if isinstance(self.current, CurrentLoop):
@@ -112,7 +112,7 @@ class Controller(ReferenceBlocks):
             yield "has a blend_time but no position_encoder to blend; leave it out"
         if self.feedforward != Feedforward() and self.speed is None:
             yield "has a feedforward, which the speed loop adds, but no speed loop; leave it out"
-        self._check_camera()
+        yield from self._check_camera()
         blocks = [key for key in ReferenceBlocks.model_fields if getattr(self, key) is not None]
         if blocks and self.position is not None and self.position.reference_delay > 0.0:
             yield f"has {blocks[0]} and position.reference_delay, which takes the reference as it is given; leave one out"
@@ -122,26 +122,20 @@ class Controller(ReferenceBlocks):
             if self.feedforward != Feedforward():
                 yield "has feedforward and inverse_model, which both add the torque that is known; give one"
 
-    def _check_firmware(self) -> None:
+    def _check_firmware(self) -> Iterator[str]:
         if self.law:
-            raise ValueError("has firmware and law = true, which both are the loops; give one of them")
+            yield "has firmware and law = true, which both are the loops; give one of them"
         if self.reference.kind != "position":
-            raise ValueError(
-                f'has a firmware and a reference of the {self.reference.kind}; a firmware follows reference.kind = "position"'
-            )
+            yield f'has a firmware and a reference of the {self.reference.kind}; a firmware follows reference.kind = "position"'
         if not isinstance(self.current, IdealCurrent | FirstOrderCurrent):
-            raise ValueError(
-                f'has a firmware, which commands the voltage, and current.kind = "{self.current.kind}"; take "ideal" or "first_order"'
-            )
+            yield f'has a firmware, which commands the voltage, and current.kind = "{self.current.kind}"; take "ideal" or "first_order"'
 
-    def _check_camera(self) -> None:
+    def _check_camera(self) -> Iterator[str]:
         if (self.camera is None) != (self.tracker is None):
             has, lacks = ("tracker", "camera") if self.camera is None else ("camera", "tracker")
-            raise ValueError(f"has a {has} but no {lacks}; camera and tracker belong together")
+            yield f"has a {has} but no {lacks}; camera and tracker belong together"
         if self.camera is not None and self.reference.kind != "position":
-            raise ValueError(
-                f'has a camera and a reference of the {self.reference.kind}; with a camera take reference.kind = "position", the direction of the target'
-            )
+            yield f'has a camera and a reference of the {self.reference.kind}; with a camera take reference.kind = "position", the direction of the target'
 
     def schedules(self) -> Iterator[tuple[str, float, int]]:
         """Name, sample time [s] and multiple of the controller's sample time for each loop.

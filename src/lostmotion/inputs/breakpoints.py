@@ -1,16 +1,16 @@
 """Breakpoints of piecewise-linear laws."""
 
 import itertools
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 RESOLUTION = 1e-9  # of the largest breakpoint; the solver takes 4e-12 of the terms of a condition for zero
 
 
-def check_rising(values: Sequence[float], name: str) -> None:
+def check_rising(values: Sequence[float], name: str) -> Iterator[str]:
     """Refuse values that do not rise."""
     for k, (a, b) in enumerate(itertools.pairwise(values)):
         if b <= a:
-            raise ValueError(f"{name} must rise, but {name}[{k + 1}] = {b} follows {a}")
+            yield f"{name} must rise, but {name}[{k + 1}] = {b} follows {a}"
 
 
 def check_apart(breakpoints: Sequence[float], name: str = "") -> None:

@@ -53,7 +53,7 @@ class AngleCurve(Part):
             yield f"has {len(self.angles)} angles and {len(values)} values; give as many of each"
         if self.angles[0] != 0.0:
             yield f"has angles that begin at {self.angles[0]}; the first must be 0"
-        check_rising(self.angles, "angles")
+        yield from check_rising(self.angles, "angles")
         check_apart((*self.angles, self.period), "angles")
         if self.angles[-1] >= self.period:
             yield f"has angles that end at {self.angles[-1]}; the last must be below the period {self.period}, where the first value comes again"

@@ -49,7 +49,7 @@ class MeshStiffness(Part):
         shares = [share for share, _ in self.pairs]
         if shares and shares[0] != 0.0:
             yield f"has pairs that begin at {shares[0]:g}; the first must be 0, the begin of the period"
-        check_rising(shares, "shares")
+        yield from check_rising(shares, "shares")
         if shares and shares[-1] >= 1.0:
             yield f"has pairs that begin at {shares[-1]:g}; the last must begin below 1, the end of the period"
         check_apart((*shares, 1.0), "shares")

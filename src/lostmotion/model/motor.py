@@ -163,9 +163,9 @@ class Motor(MotorFields):
 
     @rule
     def _complete(self) -> Iterator[str]:
-        self._check_stepper()
+        yield from self._check_stepper()
         if self.kind == "dc":
-            self._check_line()
+            yield from self._check_line()
             self._take_rated_point()
             for key in ("rated_speed", "electrical_time_constant", "armature_voltage_constant"):
                 if getattr(self, key) is None:
@@ -180,7 +180,7 @@ class Motor(MotorFields):
             if "rated_torque" not in self.model_fields_set:
                 yield 'lacks rated_torque, which a motor of kind "synchronous" needs'
         if self.winding is not None:
-            self._check_synchronous(self.winding.phase_values())
+            yield from self._check_synchronous(self.winding.phase_values())
         elif self.dc_voltage is not None:
             yield "has a dc_voltage, which only a winding needs; give motor.winding too, or leave it out"
         if self.voltage_limit is not None:
@@ -189,62 +189,48 @@ class Motor(MotorFields):
             if self.limits is not None and self.limits.max_voltage is not None:
                 yield "has voltage_limit and limits.max_voltage, which say the same of a DC motor; give one"
 
-    def _check_stepper(self) -> None:
+    def _check_stepper(self) -> Iterator[str]:
         """A stepper has its own keys."""
         if self.kind != "stepper":
             self._refuse(STEPPER_KEYS, 'which only a motor of kind "stepper" has')
             return
         for key in ("steps_per_revolution", "holding_torque"):
             if getattr(self, key) is None:
-                raise ValueError(f'lacks {key}, which a motor of kind "stepper" needs')
+                yield f'lacks {key}, which a motor of kind "stepper" needs'
         assert self.steps_per_revolution is not None
         assert self.holding_torque is not None
         if self.steps_per_revolution % 4.0 != 0.0:
-            raise ValueError(
-                f"has steps_per_revolution = {self.steps_per_revolution:g}, which must be a multiple of 4: two phases make four steps in a period of the field"
-            )
+            yield f"has steps_per_revolution = {self.steps_per_revolution:g}, which must be a multiple of 4: two phases make four steps in a period of the field"
         if self.supply_voltage is not None:
             for key in ("rated_current", "resistance_phase", "inductance_phase"):
                 if getattr(self, key) is None:
-                    raise ValueError(
-                        f"lacks {key}, which its supply_voltage needs; leave supply_voltage out for an ideal current"
-                    )
+                    yield f"lacks {key}, which its supply_voltage needs; leave supply_voltage out for an ideal current"
         if self.rated_torque != type(self).model_fields["rated_torque"].default:
-            raise ValueError("has rated_torque, of no use to a stepper; give holding_torque")
+            yield "has rated_torque, of no use to a stepper; give holding_torque"
         if self.detent_torque is not None and self.detent_torque >= self.holding_torque:
-            raise ValueError(
-                f"has detent_torque = {self.detent_torque:g} N*m, which must be below its holding_torque, {self.holding_torque:g} N*m"
-            )
+            yield f"has detent_torque = {self.detent_torque:g} N*m, which must be below its holding_torque, {self.holding_torque:g} N*m"
         if self.torque_error is not None:
             share = self.torque_error / self.holding_torque
             if not LEAST_TORQUE_ERROR <= share <= LARGEST_TORQUE_ERROR:
-                raise ValueError(
-                    f"has torque_error = {self.torque_error:g} N*m, which must be {LEAST_TORQUE_ERROR:g} to {LARGEST_TORQUE_ERROR:g} of its holding_torque"
-                )
+                yield f"has torque_error = {self.torque_error:g} N*m, which must be {LEAST_TORQUE_ERROR:g} to {LARGEST_TORQUE_ERROR:g} of its holding_torque"
 
-    def _check_line(self) -> None:
+    def _check_line(self) -> Iterator[str]:
         """Stall torque and no-load speed come together, in place of a rated point; so do the currents."""
         for one, other in (LINE_KEYS, LINE_KEYS[::-1], CURRENT_KEYS, CURRENT_KEYS[::-1]):
             if getattr(self, one) is not None and getattr(self, other) is None:
-                raise ValueError(f"has {one} without {other}; give both")
+                yield f"has {one} without {other}; give both"
         if self.stall_torque is None:
             if self.stall_current is not None:
-                raise ValueError(
-                    "has stall_current and no_load_current, which belong to stall_torque and no_load_speed; give these"
-                )
+                yield "has stall_current and no_load_current, which belong to stall_torque and no_load_speed; give these"
             return
         self._refuse(POINT_KEYS, "which stall_torque and no_load_speed say")
         if "rated_torque" in self.model_fields_set and self.rated_torque >= self.stall_torque:
-            raise ValueError(
-                f"has a rated_torque of {self.rated_torque:g} N*m, which must be below its stall_torque of {self.stall_torque:g} N*m"
-            )
+            yield f"has a rated_torque of {self.rated_torque:g} N*m, which must be below its stall_torque of {self.stall_torque:g} N*m"
         if self.stall_current is not None and self.no_load_current is not None:
             if self.no_load_current >= self.stall_current:
-                raise ValueError(
-                    f"has a no_load_current of {self.no_load_current:g} A, which must be below its stall_current of {self.stall_current:g} A"
-                )
+                yield f"has a no_load_current of {self.no_load_current:g} A, which must be below its stall_current of {self.stall_current:g} A"
             if "friction_torque" in self.model_fields_set:
-                raise ValueError("has friction_torque and no_load_current, which say the same; give one of them")
+                yield "has friction_torque and no_load_current, which say the same; give one of them"
 
     def _take_rated_point(self) -> None:
         """The rated point of (2) in place of stall torque and no-load speed, which are another way to write it.
@@ -278,21 +264,19 @@ class Motor(MotorFields):
         if idle:
             raise ValueError(f"has {', '.join(idle)}, {why}; leave {'it' if len(idle) == 1 else 'them'} out")
 
-    def _check_synchronous(self, phase: PhaseValues) -> None:
+    def _check_synchronous(self, phase: PhaseValues) -> Iterator[str]:
         """Refuse keys that exclude a winding."""
         if self.kind == "dc":
-            raise ValueError('has a winding, which only a motor of kind "synchronous" or "torque_source" can have')
+            yield 'has a winding, which only a motor of kind "synchronous" or "torque_source" can have'
         if self.limits is not None:
             for key in (*SAID_BY_WINDING, "max_voltage"):
                 if getattr(self.limits, key) is not None:
                     says = "dc_voltage" if key == "max_voltage" else "the winding"
-                    raise ValueError(f"has limits.{key}, which {says} says; leave it out")
+                    yield f"has limits.{key}, which {says} says; leave it out"
         if self.kind == "synchronous":
             voltage = phase.resistance * self.rated_torque / phase.torque_constant
             if voltage >= self.phase_voltage:
-                raise ValueError(
-                    f"stalls under its rated torque: that takes {math.sqrt(3.0) * voltage:.4g} V of dc_voltage, and {self.dc_voltage:g} V are given"
-                )
+                yield f"stalls under its rated torque: that takes {math.sqrt(3.0) * voltage:.4g} V of dc_voltage, and {self.dc_voltage:g} V are given"
 
     def __repr__(self) -> str:
         if self.kind == "stepper":

@@ -7,9 +7,9 @@ slide.
 
 import math
 from collections.abc import Iterator
-from typing import Annotated, Literal, Self
+from typing import Annotated, Literal
 
-from pydantic import Field, field_validator, model_validator
+from pydantic import Field, field_validator
 
 from ..errors import InputError
 from ..inputs import core_parameters
@@ -51,10 +51,9 @@ class StiffnessCurve(Part):
     breaks: tuple[Annotated[Length, Positive], ...] = ()
     """deflections at which the slope changes; one fewer than slopes"""
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        check_segments(self.slopes, self.breaks, "force")
-        return self
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
+        yield from check_segments(self.slopes, self.breaks, "force")
 
 
 class PitchHarmonic(core_parameters.PitchHarmonicFields, Harmonic):

@@ -3,9 +3,9 @@
 import itertools
 from collections.abc import Iterator
 from functools import lru_cache
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from .. import _core
 from ..inputs import core_parameters
@@ -17,17 +17,17 @@ from .end_stops import ShaftEndStops
 SHARE = _core.USUAL_ERROR
 
 
-def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: str = "torques") -> None:
+def check_points(speeds: tuple[float, ...], torques: tuple[float, ...], what: str = "torques") -> Iterator[str]:
     """Refuse points that are no curve over speed."""
     if len(speeds) != len(torques):
-        raise ValueError(f"has {len(speeds)} speeds and {len(torques)} {what}; give as many of each")
+        yield f"has {len(speeds)} speeds and {len(torques)} {what}; give as many of each"
     if speeds[0] != 0.0:
-        raise ValueError(f"has speeds that begin at {speeds[0]}; the first must be 0")
-    check_rising(speeds, "speeds")
+        yield f"has speeds that begin at {speeds[0]}; the first must be 0"
+    yield from check_rising(speeds, "speeds")
     check_apart(speeds, "speeds")
 
 
-def check_friction(part: Any, force: str, unit: str) -> None:
+def check_friction(part: Any, force: str, unit: str) -> Iterator[str]:
     """Refuse dry friction that is stated twice or rises when a shaft or slide breaks away.
 
     force: in the keys of the part: `torque` or `force`, in the unit given.
@@ -36,26 +36,25 @@ def check_friction(part: Any, force: str, unit: str) -> None:
     if part.friction_curve is not None:
         for key in (f"friction_{force}", "stribeck_speed"):
             if getattr(part, key):
-                raise ValueError(f"has {key} and friction_curve, which say the same; give one")
+                yield f"has {key} and friction_curve, which say the same; give one"
         slipping = getattr(part.friction_curve, f"{force}s")[0]
     if breakaway is not None and breakaway < slipping:
-        raise ValueError(
+        yield (
             f"has breakaway_{force} = {breakaway} {unit}, less than its friction in motion, {slipping} {unit}; "
             "give at least that, or leave it out"
         )
     if part.stribeck_speed is not None and not (breakaway or 0.0) > slipping:
-        raise ValueError(f"has a stribeck_speed, which needs a breakaway_{force} above friction_{force}; give it")
+        yield f"has a stribeck_speed, which needs a breakaway_{force} above friction_{force}; give it"
     if part.friction_error is not None and part.stribeck_speed is None:
-        raise ValueError("has a friction_error, which belongs to stribeck_speed; leave it out")
+        yield "has a friction_error, which belongs to stribeck_speed; leave it out"
 
 
 class FrictionCurve(core_parameters.FrictionCurveFields):
     """Dry friction torque over the magnitude of the speed: straight lines through the points, constant beyond the last."""
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        check_points(self.speeds, self.torques)
-        return self
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
+        yield from check_points(self.speeds, self.torques)
 
 
 class DragCurve(Part):
@@ -73,7 +72,7 @@ class DragCurve(Part):
 
     @rule
     def _is_a_curve(self) -> Iterator[str]:
-        check_points(self.speeds, self.torques)
+        yield from check_points(self.speeds, self.torques)
         if self.torques[0] != 0.0:
             yield f"has a torque of {self.torques[0]} N*m at rest; what holds at rest is friction_torque"
         if self.beyond == "extend" and self.torques[-1] < self.torques[-2]:
@@ -200,10 +199,9 @@ class Shaft(WithDrag, core_parameters.DryFrictionFields, Stopped, core_parameter
         unit = "kg" if self.domain == "translation" else "kg·m²"
         return f"{type(self).__name__}({self.inertia:.4g} {unit})"
 
-    @model_validator(mode="after")
-    def _friction_is_clear(self) -> Self:
-        check_friction(self, "torque", "N*m")
-        return self
+    @rule
+    def _friction_is_clear(self) -> Iterator[str]:
+        yield from check_friction(self, "torque", "N*m")
 
     def core_fields(self) -> dict[str, Any]:
         """Fields for the core, in SI units."""

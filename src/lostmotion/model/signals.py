@@ -111,7 +111,7 @@ class Samples(Part, Generic[V]):
             yield "has fewer than two points; give at least two, or use mean"
         if self.times[0] < 0.0:
             yield f"begins at {self.times[0]} s; times must not be negative"
-        check_rising(self.times, "times")
+        yield from check_rising(self.times, "times")
 
     def breakpoints(self) -> list[Breakpoint]:
         values = [float(v) for v in self.values]  # type: ignore[arg-type]

@@ -1,12 +1,11 @@
 """Slides: parts that move along a straight line, and their friction."""
 
 import math
-from typing import Annotated, Self
-
-from pydantic import model_validator
+from collections.abc import Iterator
+from typing import Annotated
 
 from ..inputs import core_parameters
-from ..inputs.part import Part
+from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, Limit, Mass, NotNegative
 from ..reproducible import sin
 from ..units.conversion import Unit
@@ -18,10 +17,9 @@ from .shaft import FrictionCurve, Shaft, check_friction, check_points
 class ForceCurve(core_parameters.ForceCurveFields):
     """Dry friction force over the magnitude of the speed: straight lines through the points, constant beyond the last."""
 
-    @model_validator(mode="after")
-    def _is_a_curve(self) -> Self:
-        check_points(self.speeds, self.forces, "forces")
-        return self
+    @rule
+    def _is_a_curve(self) -> Iterator[str]:
+        yield from check_points(self.speeds, self.forces, "forces")
 
 
 class Movable(Part):
@@ -47,10 +45,9 @@ class Slide(core_parameters.SlideFrictionFields, Movable):
     def __repr__(self) -> str:
         return f"{type(self).__name__}({self.mass:.4g} kg)"
 
-    @model_validator(mode="after")
-    def _friction_is_clear(self) -> Self:
-        check_friction(self, "force", "N")
-        return self
+    @rule
+    def _friction_is_clear(self) -> Iterator[str]:
+        yield from check_friction(self, "force", "N")
 
     def weight(self, mass: float | None = None) -> float:
         """Force of gravity against the positive direction [N], of its own mass or of another one [kg]."""

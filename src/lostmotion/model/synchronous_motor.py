@@ -225,7 +225,7 @@ class Winding(Part):
             if len(given) > 1 or (needed and not given):
                 yield f"needs {'one' if needed else 'at most one'} of {', '.join(forms.factors)}"
         self._inductances()
-        self._check_constants()
+        yield from self._check_constants()
 
     def _check_poles(self) -> None:
         if self.pole_pairs is None and self.poles is None:
@@ -275,11 +275,11 @@ class Winding(Part):
                     found[key] = share * factor * value
         return found
 
-    def _check_constants(self) -> None:
+    def _check_constants(self) -> Iterator[str]:
         constants = self._constants()
         if not constants:
             keys = ", ".join(("flux_linkage", *VOLTAGE.factors, *TORQUE.factors))
-            raise ValueError(f"needs the strength of the magnets, one of {keys}")
+            yield f"needs the strength of the magnets, one of {keys}"
         low, high = (pick(constants, key=lambda key: constants[key]) for pick in (min, max))
         ratio = constants[high] / constants[low]
         if ratio <= 1.0 + AGREEMENT:
@@ -293,7 +293,7 @@ class Winding(Part):
             ),
             " If both are printed so (hot magnets, saturation), leave one out.",
         )
-        raise ValueError(
+        yield (
             f"has {low} and {high}, which make {' and '.join(per_ampere)} N·m to one ampere rms: {100 * (ratio - 1):.1f} % apart, "
             f"more than {100 * AGREEMENT:.0f} %.{why}"
         )

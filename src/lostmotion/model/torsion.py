@@ -11,14 +11,14 @@ from ..inputs.part import Part, rule
 from ..inputs.quantities import Angle, NotNegative, Number, Positive, Share, Stiffness, UpToOne, argument
 
 
-def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: str) -> None:
+def check_segments(slopes: tuple[float, ...], breaks: tuple[float, ...], what: str) -> Iterator[str]:
     """Refuse segments that are no curve of a torque or a force."""
     if len(breaks) != len(slopes) - 1:
-        raise ValueError(f"has {len(slopes)} slopes and {len(breaks)} breaks; it needs one break fewer")
-    check_rising(breaks, "breaks")
+        yield f"has {len(slopes)} slopes and {len(breaks)} breaks; it needs one break fewer"
+    yield from check_rising(breaks, "breaks")
     check_apart((0.0, *breaks), "breaks")
     if slopes[-1] <= 0.0:
-        raise ValueError(f"ends with slope 0; the last segment must carry {what}")
+        yield f"ends with slope 0; the last segment must carry {what}"
 
 
 class Elastic(Part):
@@ -79,7 +79,7 @@ class TorsionCurve(TorsionCurveFields, Elastic):
 
     @rule
     def _is_a_curve(self) -> Iterator[str]:
-        check_segments(self.slopes, self.breaks, "torque")
+        yield from check_segments(self.slopes, self.breaks, "torque")
         if self.backlash > 0.0 and self.preload > 0.0:
             yield "has backlash and preload; a preload removes the backlash, so give only one"
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -12,7 +12,7 @@ from pydantic import Field, model_validator
 from ...errors import prefixed
 from ...inputs.argument_checks import checked
 from ...inputs.named_elements import Elements, nothing
-from ...inputs.part import Part
+from ...inputs.part import Part, rule
 from ...inputs.quantities import NotNegative, Number, Positive, Switch, Time, Whole
 from ...inputs.refusal_messages import did_you_mean
 from ...inputs.toml_files import read_toml
@@ -123,12 +123,11 @@ class FitOptions(Part):
     sample_interval: Annotated[Time, Positive] | None = None
     """sample interval of the runs behind a channel with a filter; default: the interval of the log, at most 2 ms"""
 
-    @model_validator(mode="after")
-    def _horizon_grows(self) -> Self:
+    @rule
+    def _horizon_grows(self) -> Iterator[str]:
         for a, b in itertools.pairwise(self.horizon):
             if b <= a:
-                raise ValueError(f"has horizon with {b:g} s after {a:g} s; windows must become longer")
-        return self
+                yield f"has horizon with {b:g} s after {a:g} s; windows must become longer"
 
 
 class Identification(Part):

@@ -1,11 +1,12 @@
 """The table ``monitor`` of an identification file: what is watched over the life of a drive, and when it is an alarm."""
 
-from typing import Annotated, Literal, Self
+from collections.abc import Iterator
+from typing import Annotated, Literal
 
-from pydantic import Field, model_validator
+from pydantic import Field
 
 from ...inputs.named_elements import Elements, nothing
-from ...inputs.part import Part
+from ...inputs.part import Part, rule
 from ...inputs.quantities import Number, Whole
 
 Limit = float | str | None
@@ -37,14 +38,11 @@ class Monitoring(Part):
     """largest probability of a false alarm within as many logs as `within`, all watched values together"""
     within: Annotated[Whole, Field(ge=10, le=100_000)] = 1000  #: logs behind the baseline
 
-    @model_validator(mode="after")
-    def _watches_what_changes(self) -> Self:
+    @rule
+    def _watches_what_changes(self) -> Iterator[str]:
         for name in self.constant:
             if name in self.watch:
-                raise ValueError(f"has {name} in watch and in constant; leave it out of one of them")
+                yield f"has {name} in watch and in constant; leave it out of one of them"
         if self.baseline < len(self.conditions) + 5:
             least = len(self.conditions) + 5
-            raise ValueError(
-                f"has baseline = {self.baseline} with {len(self.conditions)} conditions; give it {least} or more"
-            )
-        return self
+            yield f"has baseline = {self.baseline} with {len(self.conditions)} conditions; give it {least} or more"

@@ -1,10 +1,11 @@
 """Permissible values of a column of a study or a task."""
 
-from typing import Any, Self
+from collections.abc import Iterator
+from typing import Any
 
-from pydantic import field_validator, model_validator
+from pydantic import field_validator
 
-from ...inputs.part import Part
+from ...inputs.part import Part, rule
 from ...simulation.scenario.units_of_keys import in_si
 
 
@@ -21,11 +22,10 @@ class Bound(Part):
             raise ValueError(f"{str(value).lower()} is not a number")
         return value
 
-    @model_validator(mode="after")
-    def _says_something(self) -> Self:
+    @rule
+    def _says_something(self) -> Iterator[str]:
         if self.min is None and self.max is None:
-            raise ValueError("needs min or max")
-        return self
+            yield "needs min or max"
 
     def in_unit(self, unit: str) -> tuple[float, float]:
         """(minimum, maximum) permissible value in the unit of a column, ``"1"`` of a plain number; empty: not known, any is taken in SI.

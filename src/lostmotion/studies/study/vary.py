@@ -2,9 +2,9 @@
 
 import math
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from statistics import NormalDist
-from typing import Annotated, Any, Self
+from typing import Annotated, Any
 
 import numpy as np
 from pydantic import BaseModel, Field, model_validator
@@ -13,7 +13,7 @@ from ...data_sheets.train_components import RECORDS
 from ...errors import InputError
 from ...inputs.cached_values import kept
 from ...inputs.named_elements import Named
-from ...inputs.part import Part
+from ...inputs.part import Part, rule
 from ...inputs.quantities import Switch
 from ...inputs.refusal_messages import shown
 from ...model.signals import Signal
@@ -72,30 +72,29 @@ class Vary(Part):
         except ValueError as error:
             raise ValueError(f"of {key}: {error}") from None
 
-    @model_validator(mode="after")
-    def _one_way(self) -> Self:
+    @rule
+    def _one_way(self) -> Iterator[str]:
         ways = [w for w in WAYS if getattr(self, w) is not None]
         if bool(self.key) == bool(self.keys):
-            raise ValueError("needs key or keys, one of the two")
+            yield "needs key or keys, one of the two"
         if len(ways) != 1:
             more = ", catalogue" if kind_of_record(self.all_keys[0]) else ""
-            raise ValueError(f"of {self.title}: needs one of {', '.join(WAYS)}{more}")
+            yield f"of {self.title}: needs one of {', '.join(WAYS)}{more}"
         if any(kind_of_record(key) for key in self.all_keys) and (self.names is None or self.keys or self.relative):
-            raise ValueError(f"of {self.title}: names of records need a key of their own, and values or catalogue")
+            yield f"of {self.title}: names of records need a key of their own, and values or catalogue"
         if self.names is None and any(isinstance(x, str) for x in self.values or ()):
-            raise ValueError(f"of {self.title}: has values that are no numbers")
+            yield f"of {self.title}: has values that are no numbers"
         pair = self.uniform or self.log_uniform
         if pair is not None and not pair[0] < pair[1]:
-            raise ValueError(f"of {self.title}: {pair[0]} must be below {pair[1]}")
+            yield f"of {self.title}: {pair[0]} must be below {pair[1]}"
         if self.log_uniform is not None and self.log_uniform[0] <= 0.0:
-            raise ValueError(f"of {self.title}: log_uniform needs positive bounds")
+            yield f"of {self.title}: log_uniform needs positive bounds"
         if self.grid is not None and not 1 <= self.grid[2] <= MAX_LEVELS:
-            raise ValueError(f"of {self.title}: grid needs 1 to {MAX_LEVELS} values, not {self.grid[2]}")
+            yield f"of {self.title}: grid needs 1 to {MAX_LEVELS} values, not {self.grid[2]}"
         if self.values is not None and not self.values:
-            raise ValueError(f"of {self.title}: values is empty")
+            yield f"of {self.title}: values is empty"
         if self.triangular is not None and not self.triangular[0] <= self.triangular[1] <= self.triangular[2]:
-            raise ValueError(f"of {self.title}: triangular must rise")
-        return self
+            yield f"of {self.title}: triangular must rise"
 
     @property
     def all_keys(self) -> tuple[str, ...]:
