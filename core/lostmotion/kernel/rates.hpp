@@ -321,24 +321,64 @@ struct LinearRatesOf {
     }
 };
 
-// The coefficients of A that are not zero, row by row, and those of B, input by input.
-struct SparseRates {
-    std::vector<int> begin{0}, column;
-    std::vector<double> factor;
-    std::vector<double> positive;  // without their signs, but for what decays by itself
+// The coefficients of A that are not zero, and those of B, input by input. Those of A stand in strips: of four rows
+// that follow each other, what lies on one diagonal. The states of a chain depend on their neighbours, so few strips
+// are all that a train has.
+class SparseRates {
+ public:
     std::vector<std::vector<std::pair<int, double>>> of_input;
 
-    // Product A x, or that of the matrix `positive` with x.
-    void multiply(const double* x, double* out, bool of_positive = false) const {
-        const double* factors = of_positive ? positive.data() : factor.data();
-        const int rows = static_cast<int>(begin.size()) - 1;
-        for (int r = 0; r < rows; ++r) {
-            double sum = 0.0;
-            for (int k = begin[static_cast<std::size_t>(r)]; k < begin[static_cast<std::size_t>(r) + 1]; ++k)
-                sum += factors[k] * x[column[static_cast<std::size_t>(k)]];
-            out[r] = sum;
+    struct Coefficient {
+        int row, column;
+        double factor;
+    };
+    // n: rows. all: row by row, each in the order of its columns.
+    void set(int n, const std::vector<Coefficient>& all) {
+        auto next = all.begin();
+        for (int row = 0; row < n; row += 4) {
+            std::vector<Coefficient> some;
+            for (; next != all.end() && next->row < row + 4; ++next) some.push_back(*next);
+            std::ranges::stable_sort(some, {}, [](const Coefficient& c) { return c.column - c.row; });
+            for (const Coefficient& c : some) {
+                const int from = c.column - c.row + row;
+                if (strips_.size() == ends_.back() || strips_.back().from != from) strips_.push_back({from, {}, {}});
+                const auto lane = static_cast<std::size_t>(c.row - row);
+                strips_.back().factor[lane] = c.factor;
+                strips_.back().positive[lane] = c.row == c.column ? std::fmax(0.0, c.factor) : std::fabs(c.factor);
+            }
+            ends_.push_back(strips_.size());
         }
     }
+    // A x, in whole fours, or with magnitudes in place of its coefficients, but for what decays by itself. The terms of
+    // a row are added up in the order of their columns. x: `slack` zeros lie before and behind it.
+    static constexpr int slack = 4;
+    void multiply(const double* x, double* out, bool of_positive = false) const {
+        const auto each_four = [&](auto coefficients) ALWAYS_INLINE {
+            const Strip* strip = strips_.data();
+            for (std::size_t k = 1; k < ends_.size(); ++k) {
+                Pack<4> sum{};
+                for (const Strip* end = strips_.data() + ends_[k]; strip != end; ++strip)
+                    sum = sum + Pack<4>::load((strip->*coefficients).data()) * Pack<4>::load(x + strip->from);
+                sum.store(out + 4 * (k - 1));
+            }
+        };
+        of_positive ? each_four(&Strip::positive) : each_four(&Strip::factor);
+    }
+    Numbers product(const Numbers& x, bool of_positive = false) const {
+        const int n = 4 * static_cast<int>(ends_.size() - 1);
+        Numbers room = Numbers::zeros(n + 2 * slack), out;
+        std::copy_n(x.data(), std::min(x.size(), n), room.data() + slack);
+        multiply(room.data() + slack, out.resized(n), of_positive);
+        return out;
+    }
+
+ private:
+    struct Strip {
+        int from;  // the column of its first row
+        std::array<double, 4> factor, positive;
+    };
+    std::vector<Strip> strips_;
+    std::vector<std::size_t> ends_{0};  // of four rows each
 };
 
 // The same of a train of any size. The rates of a large train are added up row by row, of the coefficients that are not
@@ -406,14 +446,15 @@ struct LinearRatesOf<Any> {
             }
             fixed_[r] = f.one;
             for (const auto& [k, factor] : f.of_memory()) of_memory_.push_back({r, k, factor});
-            each_in_row(r, [&](int c, double factor) {
-                sparse_.column.push_back(c);
-                sparse_.factor.push_back(factor);
-                sparse_.positive.push_back(c == r ? std::fmax(0.0, factor) : std::fabs(factor));
-            });
-            sparse_.begin.push_back(static_cast<int>(sparse_.column.size()));
         }
-        if (is_small()) matrix();
+        if (is_small()) {
+            matrix();
+            return;
+        }
+        std::vector<SparseRates::Coefficient> all;
+        for (int r = 0; r < n.coupled; ++r)
+            each_in_row(r, [&](int c, double factor) { all.push_back({r, c, factor}); });
+        sparse_.set(n.coupled, all);
     }
 
     // Whether the whole matrix is used in place of what of it is not zero.
@@ -456,14 +497,7 @@ struct LinearRatesOf<Any> {
     // A x; of few states in the order of a matrix.
     Coupled operator*(const Coupled& x) const {
         if (is_small()) return matrix_ * x;
-        if (x.size() < n.coupled) {  // what lies beyond is zero
-            Coupled whole = x;
-            whole.reach(n.coupled);
-            return *this * whole;
-        }
-        Coupled out;
-        sparse_.multiply(x.data(), out.resized(n.coupled));
-        return out;
+        return sparse_.product(x);
     }
     template <class Input>
     Lanes operator()(const Coupled& x, const Column& constant, const Input& u) const {

@@ -8,6 +8,7 @@
 #pragma once
 
 #include <array>
+#include <functional>
 #include <vector>
 
 #include "inputs.hpp"
@@ -63,26 +64,20 @@ class Series {
     // Bound on |exp(A s)| times these magnitudes for 0 <= s <= h, |A| h <= theta.
     static Numbers exponential_bound(const LinearRatesOf<Any>& rates, const Numbers& magnitudes, double h,
                                      double theta) {
-        Numbers sum = magnitudes, last, next;
+        Numbers sum = magnitudes, last;
         sum.reach(rates.n.coupled);
         last = sum;
         for (int k = 1, count = terms(theta); k <= count; ++k) {
-            rates.sparse().multiply(last.data(), next.resized(sum.size()), true);
-            last = h / k * next;
+            last = h / k * rates.sparse().product(last, true);
             sum = sum + last;
         }
         return sum;
     }
     // Bound on their fourth derivatives all through the step.
     Numbers fourth_bound() const {
-        Numbers out = Numbers::zeros(static_cast<int>(n_));
         const double h4 = h_ * h_ * h_ * h_;
-        for (int k = count_; k >= 4; --k) {
-            const double* c = term(k);
-            const double factor = k * (k - 1.0) * (k - 2.0) * (k - 3.0) / h4;
-            for (std::size_t j = 0; j < n_; ++j) out.data()[j] += factor * std::fabs(c[j]);
-        }
-        return out;
+        return sum([h4](int k) { return k * (k - 1.0) * (k - 2.0) * (k - 3.0) / h4; }, 4,
+                   [](const Pack<4>& c) ALWAYS_INLINE { return absolute(c); });
     }
 
  private:
@@ -92,13 +87,14 @@ class Series {
     };
 
     void begin(const LinearRatesOf<Any>& rates, const Lanes& rate, double h, double theta) {
-        n_ = static_cast<std::size_t>(rates.n.coupled);
+        n_ = (static_cast<std::size_t>(rates.n.coupled) + 3) / 4 * 4;
         h_ = h;
         count_ = terms(theta);
         rates_ = &rates;
         angle_rate_ = rate.angle;
-        c_.resize(n_ * static_cast<std::size_t>(count_));
-        for (std::size_t j = 0; j < n_; ++j) c_[j] = h * rate.coupled[static_cast<int>(j)];
+        c_.resize(SparseRates::slack + stride() * static_cast<std::size_t>(count_));
+        each_four([&](std::size_t j)
+                      ALWAYS_INLINE { (h * rate.coupled.four(static_cast<int>(j))).store(term(1) + j); });
     }
     void add_terms() {
         for (int k = 1; k < count_; ++k) {
@@ -111,22 +107,31 @@ class Series {
                 for (const auto& [row, share] : rates_->sparse().of_input[static_cast<std::size_t>(v.input)])
                     to[row] += share * u;
             }
-            for (std::size_t j = 0; j < n_; ++j) to[j] *= factor;
+            each_four([&](std::size_t j) ALWAYS_INLINE { (factor * Pack<4>::load(to + j)).store(to + j); });
         }
     }
 
-    double* term(int k) { return c_.data() + static_cast<std::size_t>(k - 1) * n_; }
-    const double* term(int k) const { return c_.data() + static_cast<std::size_t>(k - 1) * n_; }
-    template <class Factor>
-    Numbers sum(Factor&& factor) const {
+    // Each term has the slack that the product with A needs, which it shares with its neighbours.
+    std::size_t stride() const { return n_ + SparseRates::slack; }
+    std::size_t place(int k) const { return SparseRates::slack + static_cast<std::size_t>(k - 1) * stride(); }
+    double* term(int k) { return c_.data() + place(k); }
+    const double* term(int k) const { return c_.data() + place(k); }
+    // sum_k factor(k) of(c_k), down to the term `last`.
+    template <class Factor, class Of = std::identity>
+    Numbers sum(Factor&& factor, int last = 1, Of&& of = {}) const {
         Numbers out = Numbers::zeros(static_cast<int>(n_));
         double* to = out.data();
-        for (int k = count_; k >= 1; --k) {
+        for (int k = count_; k >= last; --k) {
             const double* c = term(k);
             const double f = factor(k);
-            for (std::size_t j = 0; j < n_; ++j) to[j] += f * c[j];
+            each_four([&](std::size_t j)
+                          ALWAYS_INLINE { (Pack<4>::load(to + j) + f * of(Pack<4>::load(c + j))).store(to + j); });
         }
         return out;
+    }
+    template <class Use>
+    [[gnu::always_inline]] void each_four(Use&& use) const {
+        for (std::size_t j = 0; j < n_; j += 4) use(j);
     }
     void see_inputs(const InputState<Any>& input) {
         std::size_t used = 0;
@@ -142,7 +147,7 @@ class Series {
         varying_.resize(used);
     }
 
-    std::size_t n_ = 0;
+    std::size_t n_ = 0;  // states, in whole fours
     double h_ = 0.0;
     int count_ = 0;
     const LinearRatesOf<Any>* rates_ = nullptr;
