@@ -83,9 +83,9 @@ def test_moves_of_a_reference_can_be_changed() -> None:
     assert list(found) == ["moves.0.to", "moves.1.to", "speed", "acceleration", "jerk", "dwell"]
     assert found["moves.0.to"]["unit"] == "°"
     assert found["speed"]["target"] == {"reference": 0, "path": ["moves", "speed"]}
-    for name, controller in lm.load("direction-finder").axes().items():  # what follows a target cannot be changed
-        assert reference_view(controller.reference, 1.0) is None
-        assert list(reference_sliders(controller, f"controllers.{name}.reference", "Reference", 0, 1.0)) == []
+    follower = lm.load("direction-finder")  # what follows a target cannot be changed
+    assert [reference_view(c.reference, 1.0) for c in follower.axes().values()] == [None] * len(follower.axes())
+    assert list(reference_sliders(follower)) == []
     # A command without a sine or a step can get one with the keys that belong to it.
     own = {s.key: s for s in of_signal(CommandSignal(mean=0.5), "command", "Command", "1", {"input": 0}, 1.1, 2.0)}
     assert own["command.amplitude"].needs == {"command.frequency": 1.0}

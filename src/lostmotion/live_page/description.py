@@ -17,7 +17,7 @@ from ..units.practical import ARCMIN
 from ..version import __version__
 from . import sliders
 from .loop_margins import loop_views
-from .references import reference_sliders, reference_view
+from .references import reference_sliders, reference_view, signal_view
 from .scenario_drawing import axis_figures, drawn, stepper_figures
 
 USUAL_BACKLASH = 12.0 / ARCMIN  # to where the slider goes where there is none
@@ -36,7 +36,7 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
         "with_gap": None
         if closed is None or closed in dict(values)
         else {"key": closed, "numbers": _packed(described(scenario.replace(**{closed: USUAL_BACKLASH}))[0])},
-        "inputs": [_signal(signal, scenario.simulation.duration) for _, signal in _inputs(scenario)],
+        "inputs": [signal_view(signal, scenario.simulation.duration) for _, signal in _inputs(scenario)],
         "references": [reference_view(c.reference, scenario.simulation.duration) for c in scenario.axes().values()],
         "duration": scenario.simulation.duration,
         "interval": scenario.simulation.sample_interval,
@@ -50,24 +50,12 @@ def describe(scenario: Scenario, name: str) -> dict[str, Any]:
         "version": __version__,
         "core": core,
         **drawn(scenario),
-        "open_loop": not (
-            scenario.axes()
-            or scenario.continuous()
-            or any(m.kind == "stepper" for m in scenario.train().motors.values())
-        ),
+        "open_loop": not scenario.tables.controllers
+        and all(m.kind != "stepper" for m in scenario.train().motors.values()),
         "loops": [view for motor in scenario.axes() for view in loop_views(scenario, motor)],
         "figures": [
             *stepper_figures(scenario),
-            *(
-                figure
-                for motor, c in scenario.axes().items()
-                for figure in axis_figures(
-                    c,
-                    motor,
-                    bool(scenario.prefix(motor)),
-                    scenario.sliding().get(scenario.prefix(motor), (False, False)),
-                )
-            ),
+            *(figure for motor in scenario.axes() for figure in axis_figures(scenario, motor)),
         ],
         "sliders": [s.to_page() for s in _sliders(scenario, values, closed)],
         "scenario": scenario.model_dump(exclude_none=True, mode="json"),
@@ -97,18 +85,6 @@ def _inputs(scenario: Scenario) -> list[tuple[str, Signal[Any]]]:
     return [(keys[name], signals[name]) if name in keys and name in signals else ("", Signal()) for name in names]
 
 
-def _signal(signal: Signal[Any], duration: float) -> dict[str, Any]:
-    """Signal as page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one."""
-    others = (signal.chirp, signal.samples, getattr(signal, "wind", None))
-    return {
-        "mean": signal.mean,
-        "sines": signal.sine_list() or [(0.0, 1.0, 0.0)],
-        "steps": [(s.height, s.time) for s in signal.steps] or [sliders.no_step(duration)],
-        "ramps": [(r.rise, r.duration, r.begin) for r in signal.ramps],
-        "courses": [part.breakpoints() for part in others if part is not None],
-    }
-
-
 def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | None) -> list[sliders.Slider]:
     usual: dict[str, float] = {}
     views: dict[str, sliders.Place] = {}
@@ -124,7 +100,7 @@ def _sliders(scenario: Scenario, values: list[tuple[str, float]], closed: str | 
     units = {key: unit_for(scenario, key) or "1" for key, _ in values}
     limits = {key: limit_in(type(scenario.written), key) for key, _ in values}
     parameters = sliders.of_parameters(values, usual, views, units, limits)
-    found = [*_signal_sliders(scenario), *_reference_sliders(scenario), *parameters]
+    found = [*_signal_sliders(scenario), *reference_sliders(scenario), *parameters]
     return [
         *sliders.told_apart(sliders.ordered(found)),
         sliders.duration(scenario.simulation.duration, scenario.simulation.sample_interval),
@@ -137,12 +113,13 @@ def _signal_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
     loads = {train.variable(shaft, "load_torque"): shaft for shaft in train.shafts}
     shafts = {keys[name]: shaft for name, shaft in loads.items() if name in keys}
     duration = scenario.simulation.duration
-    for number, (key, signal) in enumerate(_inputs(scenario)):
+    inputs = _inputs(scenario)
+    for number, (key, signal) in enumerate(inputs):
         if not key or key in turned or isinstance(signal, FieldAngle):  # whose steps a slider would take away
             continue
         if key.startswith("command"):
             _, _, name = key.partition(".")
-            group = f"Command of {name.replace('_', ' ')}" if name and len(_inputs(scenario)) > 2 else "Command"
+            group = f"Command of {name.replace('_', ' ')}" if name and len(inputs) > 2 else "Command"
             yield from sliders.of_signal(signal, key, group, "1", {"input": number}, 1.1, duration)
         else:
             shaft = shafts[key]
@@ -151,16 +128,6 @@ def _signal_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
             group = word if shaft == "load" else f"{word} on {shaft.replace('_', ' ')}"
             most = _torque_at(scenario, shaft)
             yield from sliders.of_signal(signal, key, group, unit, {"input": number}, most, duration)
-
-
-def _reference_sliders(scenario: Scenario) -> Iterator[sliders.Slider]:
-    several = len(scenario.axes()) > 1
-    for number, (motor, controller) in enumerate(scenario.axes().items()):
-        table = scenario.controller_key(motor)
-        group = f"Reference of {motor.replace('_', ' ')}" if several else "Reference"
-        sliding = scenario.sliding().get(scenario.prefix(motor), (False, False))
-        duration = scenario.simulation.duration
-        yield from reference_sliders(controller, f"{table}.reference", group, number, duration, sliding)
 
 
 def _torque_at(scenario: Scenario, shaft: str) -> float:

@@ -5,9 +5,10 @@ import math
 from collections.abc import Iterator
 from typing import Any
 
-from ..control.controller import Controller
 from ..control.references import PositionReference, Reference
+from ..model.signals import TimeFunction
 from ..simulation.forms.slide_units import of_slides
+from ..simulation.scenario.scenario import Scenario
 from ..simulation.variables_of_trains import REFERENCE_UNITS
 from . import sliders
 from .sliders import Place, Range, Slider
@@ -15,11 +16,20 @@ from .sliders import Place, Range, Slider
 LIMITS = (("speed", "rad/s"), ("acceleration", "rad/s^2"), ("jerk", "rad/s^3"))
 
 
-def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any] | None:
-    """Reference as page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one.
+def signal_view(signal: TimeFunction[Any], duration: float) -> dict[str, Any]:
+    """Signal as page/src/core_input.ts describes it, with a sine and a step of height 0 for the sliders of one."""
+    others = (getattr(signal, key, None) for key in ("chirp", "samples", "wind"))
+    return {
+        "mean": signal.mean,
+        "sines": signal.sine_list() or [(0.0, 1.0, 0.0)],
+        "steps": [(s.height, s.time) for s in signal.steps] or [sliders.no_step(duration)],
+        "ramps": [(r.rise, r.duration, r.begin) for r in signal.ramps],
+        "courses": [part.breakpoints() for part in others if part is not None],
+    }
 
-    None for what follows a target, which the page cannot change.
-    """
+
+def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any] | None:
+    """Reference as a signal with its moves; None for a reference that follows a target, which the page cannot change."""
     moves, timed = None, []
     if isinstance(reference, PositionReference):
         if reference.target is not None:
@@ -31,14 +41,8 @@ def reference_view(reference: Reference[Any], duration: float) -> dict[str, Any]
         elif reference.moves:
             points = reference._pieces()[-1]
             timed = [[*(p for p, q in itertools.pairwise(points) if p[0] < q[0]), points[-1]]]
-    return {
-        "mean": reference.mean,
-        "sines": reference.sine_list() or [(0.0, 1.0, 0.0)],
-        "steps": [(s.height, s.time) for s in reference.steps] or [sliders.no_step(duration)],
-        "ramps": [(r.rise, r.duration, r.begin) for r in reference.ramps],
-        "courses": [*([] if reference.samples is None else [reference.samples.breakpoints()]), *timed],
-        "moves": moves,
-    }
+    view = signal_view(reference, duration)
+    return view | {"courses": [*view["courses"], *timed], "moves": moves}
 
 
 def _has_sliders(reference: PositionReference) -> bool:
@@ -46,34 +50,25 @@ def _has_sliders(reference: PositionReference) -> bool:
     return bool(reference.moves) and all(move.duration is None for move in reference.moves)
 
 
-def reference_sliders(
-    controller: Controller,
-    key: str,
-    group: str,
-    number: int,
-    duration: float,
-    sliding: tuple[bool, bool] = (False, False),
-) -> Iterator[Slider]:
-    """Sliders of the moves of a reference; without moves, of its mean, its first sine and its steps.
-
-    key: table of the reference in the scenario file.
-    number: among the controllers.
-    sliding: whether the motor moves a slide, and whether the position is the position of a slide.
-    """
-    reference = controller.reference
-    positions = sliding[1] and reference.kind != "torque"
-    unit = of_slides(REFERENCE_UNITS[reference.kind], positions=positions, forces=sliding[0])
-    if isinstance(reference, PositionReference) and reference.moves:
-        if _has_sliders(reference):
-            yield from _of_moves(reference, key, group, number, slides=sliding[1])
-        return
-    if isinstance(reference, PositionReference) and reference.target is not None:
-        return
-    sizes = [abs(float(v)) for v in (reference.mean, reference.amplitude or 0.0)]
-    sizes += [abs(float(part)) for s in reference.steps for part in (s.height,)]
-    sizes += [abs(float(r.rise)) for r in reference.ramps]
-    most = 1.5 * max(sizes) or {"position": math.pi, "speed": 10.0, "torque": 1.0}[reference.kind]
-    yield from sliders.of_signal(reference, key, group, unit, {"reference": number}, most, duration)
+def reference_sliders(scenario: Scenario) -> Iterator[Slider]:
+    """Sliders of the moves of each reference; without moves, of its mean, its first sine and its steps."""
+    for number, (motor, controller) in enumerate(scenario.axes().items()):
+        reference, key = controller.reference, f"{scenario.controller_key(motor)}.reference"
+        group = f"Reference of {motor.replace('_', ' ')}" if len(scenario.axes()) > 1 else "Reference"
+        forces, positions = scenario.sliding()[scenario.prefix(motor)]
+        if isinstance(reference, PositionReference) and reference.moves:
+            if _has_sliders(reference):
+                yield from _of_moves(reference, key, group, number, slides=positions)
+            continue
+        if isinstance(reference, PositionReference) and reference.target is not None:
+            continue
+        parts = (reference.mean, reference.amplitude or 0.0, *(s.height for s in reference.steps))
+        sizes = [abs(float(size)) for size in (*parts, *(r.rise for r in reference.ramps))]
+        most = 1.5 * max(sizes) or {"position": math.pi, "speed": 10.0, "torque": 1.0}[reference.kind]
+        own = REFERENCE_UNITS[reference.kind]
+        unit = of_slides(own, positions=positions and reference.kind != "torque", forces=forces)
+        duration = scenario.simulation.duration
+        yield from sliders.of_signal(reference, key, group, unit, {"reference": number}, most, duration)
 
 
 def _of_moves(reference: PositionReference, key: str, group: str, number: int, *, slides: bool) -> Iterator[Slider]:

@@ -2,7 +2,6 @@
 
 from typing import Any
 
-from ..control.controller import Controller
 from ..model.losses import LossMap
 from ..model.torsion import Rigid, TorsionCurve
 from ..simulation.scenario.scenario import Scenario
@@ -80,20 +79,14 @@ def stepper_figures(scenario: Scenario) -> list[dict[str, Any]]:
     return [{"title": title, "unit": "rad", "series": lines} for title, lines in series.items() if lines]
 
 
-def axis_figures(
-    controller: Controller, motor: str, named: bool, sliding: tuple[bool, bool] = (False, False)
-) -> list[dict[str, Any]]:
-    """Charts over time of a controller.
-
-    named: its variables begin with the name of its motor.
-    sliding: whether the motor moves a slide, and whether the position is the position of a slide.
-    """
-    prefix, suffix = (f"{motor}_", f" of {motor.replace('_', ' ')}") if named else ("", "")
-    kind = controller.reference.kind
-    if kind == "torque":
+def axis_figures(scenario: Scenario, motor: str) -> list[dict[str, Any]]:
+    """Charts over time of the controller of a motor."""
+    prefix, quantity = scenario.prefix(motor), scenario.axes()[motor].reference.kind
+    if quantity == "torque":
         return []
-    quantity = "position" if kind == "position" else "speed"
-    unit = ("m" if sliding[1] else "rad") if kind == "position" else "m/s" if sliding[0] else "rad/s"
+    suffix = f" of {motor.replace('_', ' ')}" if prefix else ""
+    motor_slides, shaft_slides = scenario.sliding()[prefix]
+    unit = ("m" if shaft_slides else "rad") if quantity == "position" else "m/s" if motor_slides else "rad/s"
     reference, measured = f"{prefix}{quantity}_reference", f"{prefix}measured_{quantity}"
     followed = [{"variable": reference, "label": "reference"}, {"variable": measured, "label": "measured"}]
     error = [{"variable": reference, "minus": measured, "label": "reference − measured"}]

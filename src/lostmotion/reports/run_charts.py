@@ -66,11 +66,8 @@ def _axes(result: xarray.Dataset) -> Iterator[Panel]:
     """Reference, measured value and following error of each controlled axis."""
     scenario = scenario_of(result)
     time = result["time"].values
-    sliding = scenario.sliding()
-    for motor, controller in scenario.axes().items():
-        for figure in axis_figures(
-            controller, motor, bool(scenario.prefix(motor)), sliding.get(scenario.prefix(motor), (False, False))
-        ):
+    for motor in scenario.axes():
+        for figure in axis_figures(scenario, motor):
             series = [s for s in figure["series"] if s["variable"] in result]
             error = any("minus" in s for s in series)
             unit, factor = charted(figure["unit"], small=error)
