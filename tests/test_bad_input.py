@@ -154,17 +154,14 @@ OVERRIDES = [
     ("gearbox.losses.mirrored=1", "key gearbox.losses.mirrored: 1 must be true or false"),
     ("gearbox.losses.mirrored=yes", 'key gearbox.losses.mirrored: "yes" must be true or false'),
     ("gearbox.losses.values=[[1, true]]", "key gearbox.losses.values[0][1]: true is a Boolean"),
-    (
-        "gearbox.added_backlash=0.01",
-        "key gearbox.added_backlash: is for gearboxes by name (gearbox.from); here change gearbox.stiffness.backlash",
-    ),
+    ("gearbox.added_backlash=0.01", "key gearbox.added_backlash: is for gearboxes by name (gearbox.from); here change gearbox.stiffness.backlash"),
     ("title=5", "key title: 5 must be text"),
     ("motor.kind=torque-source", 'did you mean "torque_source"?'),
     ("motor.limits.max_winding_temperature=-300 degC", '"-300 degC" must be at least -273.15'),
     ("command.chirp.points_per_period=true", "true must be a whole number"),
     ("command=true", "key command: true must be a table"),
     ("gearbox=maxon-ec-i-52-606793", "maxon-ec-i-52-606793 is a motor; a gearbox is wanted here"),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("override", "sentence"), OVERRIDES, ids=[o for o, _ in OVERRIDES])
@@ -199,14 +196,11 @@ PARTS = [
     (lambda: lm.model.TorsionCurve(slopes=5), "key slopes: 5 must be a list"),
     (lambda: lm.CommandSignal(amplitude=3), "the command signal lacks frequency"),
     (lambda: lm.data_sheets.GearboxSheet(name="x", kind="magic", ratio=3), 'key kind: "magic" must be one of "strain_wave"'),
-    (
-        lambda: lm.data_sheets.GearboxSheet(name="My Gear", kind="other", ratio=3),
-        "must consist of letters, digits, dots and dashes; capitals are read as small letters",
-    ),
+    (lambda: lm.data_sheets.GearboxSheet(name="My Gear", kind="other", ratio=3), "must consist of letters, digits, dots and dashes; capitals are read as small letters"),
     (lambda: setattr(lm.Load(inertia=1), "inertia", 2), "the load is frozen"),
     (lambda: lm.gearbox("paper-gearbox", added_backlash="1,5 arcmin"), 'write "1.5 arcmin"'),
     (lambda: lm.motor("paper-motor", voltage_limit="24 A"), 'key voltage_limit: "24 A" has the unit of something else'),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("make", "sentence"), PARTS, ids=[s for _, s in PARTS])
@@ -428,25 +422,17 @@ CALLS = [
     ("an explanation after the end", ["run", "good.toml", "--explain", "99"], ["--explain 99", "0.01"]),
     ("an unknown solver", ["run", "good.toml", "--solver", "euler"], ["euler", "exact"]),
     ("a tolerance of zero", ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "0"], ["tolerance"]),
-    (
-        "a tolerance below rounding",
-        ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "1e-300"],
-        ["--tolerance 1e-300", "between 1e-15 and 0.001"],
-    ),
+    ("a tolerance below rounding", ["run", "good.toml", "--solver", "dormand-prince", "--tolerance", "1e-300"], ["--tolerance 1e-300", "between 1e-15 and 0.001"]),
     ("a tolerance of the exact solver", ["run", "good.toml", "--tolerance", "1e-9"], ["--tolerance", "exact solver has none"]),
     ("a report into a file", ["reproduce", "-o", "good.toml"], ["good.toml", "directory"]),
     ("a run that leaves all bounds", ["run", "good.toml", "--set", "command.amplitude=1e12"], ["t ="]),
-    (
-        "a range without measure",
-        ["response", "good.toml", "--frequencies", "1..100:1000000000"],
-        ["--frequencies 1..100:1000000000", "has more than 100000 values"],
-    ),
+    ("a range without measure", ["response", "good.toml", "--frequencies", "1..100:1000000000"], ["--frequencies 1..100:1000000000", "has more than 100000 values"]),
     (
         "a stiffness without measure",
         ["run", "good.toml", "--set", 'gearbox.stiffness={kind="linear", stiffness=1e200}'],
         ["left the range that can be computed at t =", "stiffness"],
     ),
-]
+]  # fmt: skip
 
 
 @pytest.mark.parametrize(("arguments", "words"), [c[1:] for c in CALLS], ids=[c[0] for c in CALLS])

@@ -391,14 +391,8 @@ REFUSED: list[tuple[Callable[[lm.Drive], Any], str]] = [
     (lambda d: two("two-motors-one-ring").step(0.1), ": command: there are several"),
     (lambda d: two("two-motors-one-ring").step(first_motor_command=0.1), ": second_motor_command: missing"),
     (lambda d: two("two-motors-one-ring", controllers=lm.load("speed-axis").controller), ": one motor"),
-    (
-        lambda d: two("paper-2dof-nl-small", sensitivities=["gearbox.stiffness.backlash"]),
-        "sensitivities.gearbox.stiffness.backlash: is 0 for drive 0",
-    ),
-    (
-        lambda d: two("paper-2dof-nl-small", sensitivities=["simulation.duration"]),
-        "sensitivities.simulation.duration: no number that a batch differentiates by",
-    ),
+    (lambda d: two("paper-2dof-nl-small", sensitivities=["gearbox.stiffness.backlash"]), "sensitivities.gearbox.stiffness.backlash: is 0 for drive 0"),
+    (lambda d: two("paper-2dof-nl-small", sensitivities=["simulation.duration"]), "sensitivities.simulation.duration: no number that a batch differentiates by"),
     (lambda d: two("paper-2dof-nl-small", sensitivities=["load.inertias"]), ": did you mean load.inertia"),
     (lambda d: two("position-axis", sensitivities=["load.inertia"]), ": a controller turns the motor"),
     (lambda d: two("two-motors-one-ring", sensitivities=["shafts.ring.inertia"]), ": lm.simulate takes all trains"),
@@ -406,7 +400,7 @@ REFUSED: list[tuple[Callable[[lm.Drive], Any], str]] = [
     (lambda d: two(d, controllers=[lm.load("position-axis").controller]), ": controllers: there are 1 for 2 drives"),
     (lambda d: two(d, controllers=[1, 2]), ": controllers: 1 must be a Controller"),
     (lambda d: two(d, controllers=lm.load("speed-axis", LAW).controller), ": a law of your own is for"),
-]
+]  # fmt: skip
 LAW = {"controller.law": True, "controller.speed": None}
 
 

@@ -328,11 +328,7 @@ DIALECTS: dict[str, tuple[str, str, str]] = {
     "commas": (columns(",", repr, "time [s],position [rad]"), "position", ""),
     "spaces": (columns("  ", repr, "time [s]   position [rad]"), "position", ""),
     "tabs": (columns("\t", repr, "time\tposition"), "position", ""),
-    "semicolons at the ends of lines too": (
-        columns(";", lambda v: f"{v!r}", "time;position;").replace("\n", ";\n").replace(";;", ";"),
-        "position",
-        "",
-    ),
+    "semicolons at the ends of lines too": (columns(";", lambda v: f"{v!r}", "time;position;").replace("\n", ";\n").replace(";;", ";"), "position", ""),
     "semicolons and decimal commas": (columns(";", comma, "time;position"), "position", COMMAS),
     "spaces and decimal commas": (columns(" ", comma, "time position"), "position", COMMAS),
     "tabs and decimal commas": (columns("\t", comma, "time\tposition"), "position", COMMAS),
@@ -340,7 +336,7 @@ DIALECTS: dict[str, tuple[str, str, str]] = {
     "no heading, spaces": (columns(" ", repr), "column 2", UNNAMED),
     "units in the line below": (columns(",", repr, "time,position\ns,rad"), "position", ""),
     "commas in the heading": (columns(";", repr, "time [s];position, left [rad]"), "position, left", ""),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", DIALECTS)
@@ -505,11 +501,7 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
     "word in a column": ("h.csv", "time,x\n0,1\n1,fast\n", "'fast' in column x is not a number"),
     "column twice": ("i.csv", "time,x,x\n0,1,1\n1,2,2\n", "twice"),
     "unit of the time": ("j.csv", "time [fortnight],x\n0,1\n1,2\n", "the unit 'fortnight' of the time"),
-    "decimal commas and points": (
-        "o.csv",
-        "time;x\n0,1;1\n1.2;2\n",
-        "line 3: '1.2' in column time is not a number; write all numbers with decimal points",
-    ),
+    "decimal commas and points": ("o.csv", "time;x\n0,1;1\n1.2;2\n", "line 3: '1.2' in column time is not a number; write all numbers with decimal points"),
     "commas between columns and before decimals": ("q.csv", "time,x\n0,1,1,5\n0,2,2,5\n", "line 2: has 4 values for 2 columns"),
     "one column": ("r.csv", "time\n0\n1\n", "has one column; a log needs the time and one channel at least"),
     "a comma that may be one between thousands": (
@@ -535,7 +527,7 @@ FILES: dict[str, tuple[str, bytes | str, str]] = {
     "not MATLAB": ("l.mat", b"something else", "is not a MATLAB file"),
     "not Parquet": ("m.parquet", b"something else", "is not a Parquet file"),
     "unknown ending": ("n.xyz", "", "logs end in"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", FILES)

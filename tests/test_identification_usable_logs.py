@@ -90,10 +90,7 @@ UNUSABLE: dict[str, tuple[dict[str, Any] | str, str]] = {
     "a number of 5000 digits": ('{"entries": [{"timestamp": ' + "9" * 5000 + "}]}", "is not JSON"),
     "no time": (without("timestamp"), "entries[0] lacks timestamp; add it to each entry, or the interval dt"),
     "a step of time below 0": (without("timestamp", dt=-0.01), "entries[0] lacks timestamp; add it"),
-    "no supply voltage": (
-        without("vin"),
-        "has no vin, which key set.controllers.servo.position.gain names; add it to the file, or give it with logs.header",
-    ),
+    "no supply voltage": (without("vin"), "has no vin, which key set.controllers.servo.position.gain names; add it to the file, or give it with logs.header"),
     "a mass of nothing": (servo_log(mass=None), "has no mass, which key set.shafts.arm.inertia names"),
     "a length as a list": (servo_log(length=[0.1]), "has no length"),
     "a mass below 0": (servo_log(mass=-1.0), "key gravity.pendulum.mass: -0.95 must be greater than 0"),
@@ -104,7 +101,7 @@ UNUSABLE: dict[str, tuple[dict[str, Any] | str, str]] = {
     "nothing but overflow": (each(position=lambda k: 1e308 * (-1) ** k), "has no number in any sample"),
     "times in ns since 1970": (each(timestamp=lambda k: 1.7e18 + 1e7 * k), "times are read in s: give their unit"),
     "a clock that is set": (each(timestamp=lambda k: 0.01 * k + 1.7e9 * (k > 30)), "split the file where the clock jumps"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", UNUSABLE)
@@ -127,17 +124,11 @@ NOTED: dict[str, tuple[dict[str, Any], str]] = {
     ),
     "a time that is infinite": (changed(lambda log: log["entries"][5].update(timestamp=float("inf"))), "dropped 1 sample without a time"),
     "a time of 400 digits": (changed(lambda log: log["entries"][5].update(timestamp=10**400)), "dropped 1 sample without a time"),
-    "a value beyond all": (
-        changed(lambda log: log["entries"][5].update(position=1e300)),
-        "the residuals of 1 sample in which position is not a number are left out",
-    ),
-    "a switch of nothing": (
-        changed(lambda log: log["entries"][7].update(torque_enable=None)),
-        "dropped 1 sample in which torque_enable is not a number",
-    ),
+    "a value beyond all": (changed(lambda log: log["entries"][5].update(position=1e300)), "the residuals of 1 sample in which position is not a number are left out"),
+    "a switch of nothing": (changed(lambda log: log["entries"][7].update(torque_enable=None)), "dropped 1 sample in which torque_enable is not a number"),
     "times in ms": (each(timestamp=lambda k: 10.0 * k), "its samples are 10 s apart; times are read in s"),
     "a header with a parameter's name": (servo_log(resistance=99.0), "resistance is known of the log, and a parameter"),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", NOTED)

@@ -570,11 +570,7 @@ def row(number: int, cells: bytes) -> bytes:
 WORKBOOKS: dict[str, tuple[str, bytes, str]] = {
     "many rows": ("xl/worksheets/sheet1.xml", SHEET % (b"<row/>" * 100_000), "needs .* of memory"),
     "a row of many cells": ("xl/worksheets/sheet1.xml", SHEET % row(2, b"<c/>" * 10_000), "needs .* of memory"),
-    "rows of far cells": (
-        "xl/worksheets/sheet1.xml",
-        SHEET % b"".join(row(k, b'<c r="XFD%d"/>' % k) for k in range(2, 100)),
-        "needs .* of memory",
-    ),
+    "rows of far cells": ("xl/worksheets/sheet1.xml", SHEET % b"".join(row(k, b'<c r="XFD%d"/>' % k) for k in range(2, 100)), "needs .* of memory"),
     "elements outside of rows": ("xl/worksheets/sheet1.xml", SHEET % (b"<x/>" * 100_000), "needs .* of memory"),
     "styles": ("xl/styles.xml", b"<styleSheet>" + b"<xf/>" * 100_000 + b"</styleSheet>", "needs .* of memory"),
     "texts": ("xl/sharedStrings.xml", b"<sst>" + b"<si/>" * 100_000 + b"</sst>", "needs .* of memory"),
@@ -594,7 +590,7 @@ WORKBOOKS: dict[str, tuple[str, bytes, str]] = {
         SHEET % row(2, b'<c r="A2"><v>1</v></c><c r="B2" t="e"><f>1/0</f><v>#DIV/0!</v></c>'),
         "row 2: '#DIV/0!' in column x is not a number",
     ),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", WORKBOOKS)
@@ -613,17 +609,11 @@ def test_values_of_formulas_are_read(tmp_path: Path) -> None:
 
 MAIN = b"http://schemas.openxmlformats.org/spreadsheetml/2006/main"
 MEASURED: dict[str, tuple[str, bytes]] = {
-    "cells": (
-        "xl/worksheets/sheet1.xml",
-        SHEET % b"".join(row(k, b'<c r="A%d"><v>%d</v></c><c r="B%d"><v>1.5</v></c>' % (k, k, k)) for k in range(2, 8_000)),
-    ),
-    "rows with a height": (
-        "xl/worksheets/sheet1.xml",
-        SHEET % b"".join(b'<row ht="15" r="%d"><c><v>%d</v></c><c><v>1</v></c></row>' % (k, k) for k in range(2, 20_000)),
-    ),
+    "cells": ("xl/worksheets/sheet1.xml", SHEET % b"".join(row(k, b'<c r="A%d"><v>%d</v></c><c r="B%d"><v>1.5</v></c>' % (k, k, k)) for k in range(2, 8_000))),
+    "rows with a height": ("xl/worksheets/sheet1.xml", SHEET % b"".join(b'<row ht="15" r="%d"><c><v>%d</v></c><c><v>1</v></c></row>' % (k, k) for k in range(2, 20_000))),
     "styles": ("xl/styles.xml", b'<styleSheet xmlns="%s"><cellXfs>%s</cellXfs></styleSheet>' % (MAIN, b"<xf/>" * 8_000)),
     "texts": ("xl/sharedStrings.xml", b'<sst xmlns="%s">%s</sst>' % (MAIN, b"".join(b"<si><t>%d</t></si>" % k for k in range(30_000)))),
-}
+}  # fmt: skip
 
 
 @pytest.mark.parametrize("what", MEASURED)
