@@ -143,17 +143,21 @@ def test_a_command_limit_is_kept() -> None:
         assert limited == pytest.approx(at_limit, rel=1e-10, abs=1e-10)
 
 
-@pytest.mark.parametrize("threads", [2, 3])
-def test_neither_threads_nor_order_change_a_bit(threads: int) -> None:
+@pytest.mark.parametrize("threads", [1, 2, 3])
+@pytest.mark.parametrize("controlled", [False, True])
+def test_neither_threads_nor_order_nor_a_snapshot_change_a_bit(controlled: bool, threads: int) -> None:
     generator = np.random.default_rng(5)
-    drives = [random_drive(generator) for _ in range(20)] * 10
-    commands = random_commands(generator, 150, len(drives))
-    one = run(lm.SimulationBatch(drives, STEP, threads=1), commands)
-    assert np.array_equal(run(lm.SimulationBatch(drives, STEP, threads=threads), commands), one)
+    drives = [positioned(generator) for _ in range(4)] * 40 if controlled else [random_drive(generator) for _ in range(20)] * 10
+    commands = generator.uniform(-0.02, 0.02, (40, len(drives))) if controlled else random_commands(generator, 150, len(drives))
+    controllers = lm.load("position-axis").controller if controlled else None
+    one = run(lm.SimulationBatch(drives, STEP, controllers=controllers, threads=1), commands)
     order = generator.permutation(len(drives))
-    shuffled = lm.SimulationBatch([drives[k] for k in order], STEP, threads=threads)
-    assert np.array_equal(run(shuffled, commands[:, order]), one[:, :, order])
-    alone = lm.SimulationBatch(drives[7], STEP, count=1)
+    shuffled = lm.SimulationBatch([drives[k] for k in order], STEP, controllers=controllers, threads=threads)
+    before = shuffled.snapshot()
+    for _ in range(2):
+        assert np.array_equal(run(shuffled, commands[:, order]), one[:, :, order])
+        shuffled.restore(before)
+    alone = lm.SimulationBatch(drives[7], STEP, controllers=controllers, count=1)
     assert np.array_equal(run(alone, commands[:, 7:8]), one[:, :, 7:8])
 
 
@@ -644,21 +648,6 @@ def test_a_written_inertia_acts_with_the_whole_of_the_next_step() -> None:
     batch.parameters["shafts.free.inertia"][1] = 4.0
     batch.step(motor_command=0.0, free_load_torque=3.0)
     assert batch["free_speed"] - before == pytest.approx([-3.0 * STEP, -0.75 * STEP], rel=1e-12)
-
-
-@pytest.mark.parametrize("threads", [1, 2])
-def test_neither_threads_nor_order_change_a_bit_under_controllers(threads: int) -> None:
-    generator = np.random.default_rng(12)
-    drives = [positioned(generator) for _ in range(4)] * 40
-    controller = lm.load("position-axis").controller
-    targets = generator.uniform(-0.02, 0.02, (40, len(drives)))
-    one = run(lm.SimulationBatch(drives, STEP, controllers=controller, threads=1), targets)
-    order = generator.permutation(len(drives))
-    other = lm.SimulationBatch([drives[k] for k in order], STEP, controllers=controller, threads=threads)
-    before = other.snapshot()
-    assert np.array_equal(run(other, targets[:, order]), one[:, :, order])
-    other.restore(before)
-    assert np.array_equal(run(other, targets[:, order]), one[:, :, order])
 
 
 def test_what_varies_leaves_the_controller_as_it_was_tuned() -> None:

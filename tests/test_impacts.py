@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 import lostmotion as lm
 from conftest import some
-from lostmotion.errors import InputError
 from refusals import refusals_of
 from tables import gear_between, run_of
+from test_end_stops import ball
 
 Vector = NDArray[np.float64]
 
@@ -324,16 +324,6 @@ def test_flanks_that_touch_part_where_they_would_pull() -> None:
     assert np.all(torque[after] == 0.0)
 
 
-def test_step_by_step_it_is_the_same() -> None:
-    scenario = pair(0.5, torques=(-3.0, 0.0), duration=0.5)
-    whole = lm.simulate(scenario)
-    simulation = lm.Simulation(scenario)
-    for _ in range(100):
-        simulation.advance(5e-3, a_load_torque=-3.0, b_load_torque=0.0)
-    for name in ("a_speed", "b_speed", "mesh_twist"):
-        assert simulation[name] == pytest.approx(float(whole[name].values[-1]), rel=1e-11)
-
-
 test_what_is_no_law_of_flanks_or_impacts_do_not_cover_is_refused = refusals_of(
     lambda changes: pair(0.5).replace(**changes),
     ({"gears.mesh.stiffness": {"kind": "rigid", "backlash": 0.02}}, "gears.mesh.stiffness: give their restitution, 0 to 1, or a stiffness"),
@@ -356,14 +346,13 @@ def test_explanations_and_events_name_flanks_and_impacts() -> None:
     assert {names[cause] for cause in events.values.tolist()} == {"struck"}
 
 
-def test_functions_without_impacts_say_so() -> None:
-    scenario = pair(0.5)
-    for call in (
-        lambda: lm.linearize(scenario),
-        lambda: lm.linearize(scenario.train(), lm.TrainInitial()),
-        lambda: lm.linearize(lm.Simulation(scenario.train())),
-        lambda: lm.simulate(scenario, sensitivities=["shafts.a.inertia"]),
-        lambda: lm.check_drive(scenario),
-    ):
-        with pytest.raises(InputError, match=r"gears\.mesh has rigid flanks with backlash"):
-            call()
+test_functions_without_impacts_say_so = refusals_of(
+    lambda use: use(pair(0.5)),
+    (lm.linearize, ": gears.mesh has rigid flanks with backlash"),
+    (lambda s: lm.linearize(s.train(), lm.TrainInitial()), ": gears.mesh has rigid flanks with backlash"),
+    (lambda s: lm.linearize(lm.Simulation(s.train())), ": gears.mesh has rigid flanks with backlash"),
+    (lambda s: lm.simulate(s, sensitivities=["shafts.a.inertia"]), ": gears.mesh has rigid flanks with backlash"),
+    (lm.check_drive, ": gears.mesh has rigid flanks with backlash"),
+    (lambda _: lm.linearize(ball({"restitution": 0.5})), ": slides.ball.end_stops"),
+    (lambda _: lm.simulate(ball({"restitution": 0.5}), sensitivities=["slides.ball.mass"]), ": slides.ball.end_stops"),
+)

@@ -166,16 +166,6 @@ def test_two_of_them_in_a_row_and_one_tied_to_another() -> None:
     np.testing.assert_allclose(result["n2_speed"].values, -result["n1_speed"].values, rtol=0.0, atol=1e-14)
 
 
-def test_step_by_step_and_as_a_whole_it_is_the_same() -> None:
-    scenario = chain(first=GAP)
-    simulation = lm.Simulation(scenario.replace(**{"shafts.a.torque": 1.0}))
-    for _ in range(50):
-        simulation.advance(1e-3, a_load_torque=1.0)
-    whole = lm.simulate(scenario.replace(**{"shafts.a.torque": 1.0, "simulation.duration": 0.05}))
-    for name in ("node_speed", "b_speed"):
-        assert simulation[name] == pytest.approx(float(whole[name].values[-1]), rel=1e-11)
-
-
 test_what_has_no_unique_motion_is_refused_with_the_remedy = refusals_of(
     lambda changes: chain().replace(**changes),
     ({"gears.first.mesh_damping": 0.0, "gears.second.mesh_damping": 0.0},

@@ -17,6 +17,10 @@ from tables import gear_between, linked, rated_gearbox, run_of, torque_source
 from test_c_interface import OK, library  # noqa: F401
 from test_description import Scenario
 from test_drive_train import train
+from test_end_stops import ball
+from test_impacts import pair
+from test_massless_shafts import GAP as GAP_AT_NODE
+from test_massless_shafts import chain
 
 
 def two_shafts(**tables: Any) -> lm.Scenario:
@@ -445,15 +449,29 @@ def test_it_begins_at_a_tooth_and_drives_at_once() -> None:
     assert float(result["drum_speed"][-1]) == pytest.approx(T / (J_1 + J_2) * 3.0, rel=1e-12)
 
 
-def test_solvers_and_steps_agree() -> None:
-    scenario = handle(7, 0.3)
-    exact = lm.simulate(scenario)
-    adaptive = lm.simulate(scenario, solver="dormand-prince", relative_tolerance=1e-11)
+def test_both_solvers_agree_on_a_ratchet() -> None:
+    exact = lm.simulate(handle(7, 0.3))
+    adaptive = lm.simulate(handle(7, 0.3), solver="dormand-prince", relative_tolerance=1e-11)
     assert float(adaptive["drum_speed"][-1]) == pytest.approx(float(exact["drum_speed"][-1]), rel=1e-8)
-    simulation = lm.Simulation(scenario)
-    for _ in range(30):
-        simulation.advance(0.1, handle_load_torque=-T)
-    assert simulation["drum_speed"] == pytest.approx(float(exact["drum_speed"][-1]), rel=1e-11)
+
+
+NODE = {"shafts.a.torque": 1.0, "simulation.duration": 0.05}
+STEPPED = {
+    "ratchet": (handle(7, 0.3), {"handle_load_torque": -T}, 30, ("drum_speed",)),
+    "end stop": (ball({"restitution": 0.6}, duration=4.0), {"ball_load_force": 9.80665}, 80, ("ball_position",)),
+    "flanks": (pair(0.5, torques=(-3.0, 0.0), duration=0.5), {"a_load_torque": -3.0}, 100, ("a_speed", "b_speed", "mesh_twist")),
+    "node": (chain(first=GAP_AT_NODE).replace(**NODE), {"a_load_torque": 1.0}, 50, ("node_speed", "b_speed")),
+}
+
+
+@pytest.mark.parametrize("what", STEPPED)
+def test_step_by_step_it_is_the_same(what: str) -> None:
+    scenario, inputs, steps, names = STEPPED[what]
+    whole, simulation = lm.simulate(scenario), lm.Simulation(scenario)
+    for _ in range(steps):
+        simulation.advance(scenario.simulation.duration / steps, **dict.fromkeys(simulation.inputs, 0.0) | inputs)
+    for name in names:
+        assert simulation[name] == pytest.approx(float(whole[name][-1]), rel=1e-11, abs=1e-12), name
 
 
 # --- stiffness that depends on the direction of twist ---
