@@ -7,33 +7,15 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from xml.etree import ElementTree as ET
 
-from ..units.grammar import read_unit
+from ..units.grammar import read_si
+from ..units.unit_table import powers_of
 from .derivation import Parameter
 
 # bindings/fmu/variables.hpp has the same.
 FIRST_INPUT, FIRST_INPUT_RATE, FIRST_OUTPUT, FIRST_STATE, FIRST_DERIVATIVE = 1000, 2000, 3000, 5000, 6000
 FIRST_INDICATOR, FIRST_PARAMETER = 7000, 1_000_000
 
-# Powers of kg, m, s, A, K, rad.
-_BASE = {
-    "kilogram": (1, 0, 0, 0, 0, 0),
-    "gram": (1, 0, 0, 0, 0, 0),
-    "meter": (0, 1, 0, 0, 0, 0),
-    "second": (0, 0, 1, 0, 0, 0),
-    "ampere": (0, 0, 0, 1, 0, 0),
-    "kelvin": (0, 0, 0, 0, 1, 0),
-    "degree_Celsius": (0, 0, 0, 0, 1, 0),
-    "radian": (0, 0, 0, 0, 0, 1),
-    "newton": (1, 1, -2, 0, 0, 0),
-    "pascal": (1, -1, -2, 0, 0, 0),
-    "joule": (1, 2, -2, 0, 0, 0),
-    "watt": (1, 2, -3, 0, 0, 0),
-    "volt": (1, 2, -3, -1, 0, 0),
-    "ohm": (1, 2, -3, -2, 0, 0),
-    "henry": (1, 2, -2, -2, 0, 0),
-    "hertz": (0, 0, -1, 0, 0, 0),
-}
-_NAMES = ("kg", "m", "s", "A", "K", "rad")
+_BASES = ("kg", "m", "s", "A", "K", "rad")
 # Other units of the same quantity: name and how many of it one of the SI unit is.
 _DISPLAY = {
     "rad": (("deg", 180.0 / math.pi), ("arcmin", 10800.0 / math.pi), ("mrad", 1e3)),
@@ -117,29 +99,14 @@ def add_units(root: ET.Element, model: Model, *, input_rates: bool) -> None:
         {v.unit for v in (*model.inputs, *model.outputs, *model.states)} | {p.unit for p in model.parameters} | {"s"}
     )
     rates = {rate_unit(v.unit): v.unit for v in (*model.states, *(model.inputs if input_rates else ()))}
-    powers = {rate: _powers(unit, per_second=True) for rate, unit in rates.items()}
-    powers |= {unit: _powers(unit) for unit in units}
+    powers = {rate: powers_of([*read_si(unit).items(), ("second", -1)]) for rate, unit in rates.items()}
+    powers |= {unit: powers_of(read_si(unit).items()) for unit in units}
     definitions = ET.SubElement(root, "UnitDefinitions")
     for unit in sorted(powers):
         element = ET.SubElement(definitions, "Unit", name=unit)
-        ET.SubElement(element, "BaseUnit", {n: str(p) for n, p in zip(_NAMES, powers[unit], strict=True) if p})
+        ET.SubElement(element, "BaseUnit", {base: str(powers[unit][base]) for base in _BASES if base in powers[unit]})
         for name, factor in _DISPLAY.get(unit, ()):
             ET.SubElement(element, "DisplayUnit", name=name, factor=repr(factor))
-
-
-def _powers(unit: str, *, per_second: bool = False) -> list[int]:
-    """Powers of the base units."""
-    powers = [0, 0, -1 if per_second else 0, 0, 0, 0]
-    for name, n in _product(unit).items():
-        powers = [a + n * b for a, b in zip(powers, _BASE[name], strict=True)]
-    return powers
-
-
-def _product(unit: str) -> Mapping[str, int]:
-    """The powers of a unit of a result variable or a key; joule is none that is written in scenario files."""
-    if unit in ("1", "J"):
-        return {"joule": 1} if unit == "J" else {}
-    return read_unit(unit)
 
 
 def parameter_meaning(p: Parameter) -> str:

@@ -139,6 +139,11 @@ def read_unit(text: str) -> Product:
         place, sign = join.end(), -1 if join[1] else 1
 
 
+def read_si(unit: str) -> Product:
+    """The same of the SI unit of a result or a key: 1 is a plain number, and joule is none that is written in files."""
+    return {"joule": 1} if unit == "J" else read_unit(unit) if unit != "1" else {}
+
+
 def _factor(text: str, place: int) -> tuple[Product, int]:
     """One unit, or a product in brackets, with its power, and where it ends."""
     if text.startswith("(", place):

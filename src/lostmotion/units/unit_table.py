@@ -1,6 +1,6 @@
 """The units of the grammar in SI. Prefixes are left out; the tests compare all units with a unit library."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from decimal import Decimal
 from functools import cache
 
@@ -81,9 +81,10 @@ def factor_of(units: Mapping[str, int]) -> Decimal:
     return factor
 
 
-def _powers(units: Mapping[str, float]) -> dict[str, float]:
+def powers_of(units: Iterable[tuple[str, float]]) -> dict[str, float]:
+    """The power of each SI base unit, and of the plane angle (rad), in a product of units to their powers."""
     found: dict[str, float] = {}
-    for name, power in units.items():
+    for name, power in units:
         for base, n in _unit(name)[1].items():
             found[base] = found.get(base, 0) + n * power
     return {base: power for base, power in found.items() if power}
@@ -91,9 +92,9 @@ def _powers(units: Mapping[str, float]) -> dict[str, float]:
 
 def dimension_of(units: Mapping[str, float]) -> dict[str, float]:
     """The power of each SI base unit in a product of units; of an angle none."""
-    return {base: power for base, power in _powers(units).items() if base != "rad"}
+    return {base: power for base, power in powers_of(units.items()).items() if base != "rad"}
 
 
 def angle_of(units: Mapping[str, int]) -> int:
     """The power of the plane angle, whose dimension is the dimension of a plain number."""
-    return int(_powers(units).get("rad", 0))
+    return int(powers_of(units.items()).get("rad", 0))

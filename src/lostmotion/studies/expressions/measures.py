@@ -1,9 +1,8 @@
 """Properties of a value in a study's expression before any run: its unit, and whether it has a value for each instant."""
 
-import re
 from typing import NamedTuple
 
-from ...units.grammar import PREFIXED
+from ...units.grammar import PREFIXED, read_si
 from ...units.unit_table import dimension_of
 
 Powers = dict[str, float]  # unit of the table: its power
@@ -21,10 +20,7 @@ class Measure(NamedTuple):
 
 def measure(unit: str, *, over_time: bool = False) -> Measure:
     """Measure of a value with a unit; ``"1"`` for a plain number."""
-    found: Powers = {}
-    for over, symbol, exponent in re.findall(r"(/?)([A-Za-zΩ]+)(?:\^([0-9]+))?", unit):
-        found = _times(found, {NAMES[symbol]: float(exponent or 1)}, -1 if over else 1)
-    return Measure(found, over_time)
+    return Measure(dict(read_si(unit)), over_time)
 
 
 def plain(*parts: Measure, boolean: bool = False) -> Measure:
