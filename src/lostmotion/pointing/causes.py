@@ -11,7 +11,9 @@ Tables = dict[str, Any]
 K = TypeVar("K")
 
 FINE = 50_000  # microsteps of a run whose steps are taken away
-SCREW_LOSSES = ("efficiency", "backdriving_efficiency", "mean_diameter", "friction_coefficient", "friction_angle")
+SCREW_LOSSES = "efficiency backdriving_efficiency mean_diameter friction_coefficient friction_angle"
+LAWS = "stribeck_speed friction_error friction_curve"
+NO_LOSSES = {"kind": "constant_efficiency", "efficiency": 1.0}
 
 
 def linear_drives(data: Tables) -> Iterator[Tables]:
@@ -47,24 +49,17 @@ def _low_stiffness(data: Tables) -> None:
             curve["slopes"] = tuple(curve["slopes"][-1] if slope > 0.0 else 0.0 for slope in curve["slopes"])
 
 
-def _hysteresis(data: Tables) -> None:
-    for gear in (*data["gears"].values(), *linear_drives(data)):
-        gear.pop("hysteresis", None)
-
-
-def _transmission_error(data: Tables) -> None:
-    for gear in data["gears"].values():
-        gear.pop("transmission_error", None)
-    for drive in linear_drives(data):
-        drive.pop("pitch_error", None)
-
-
 def _of_steppers(data: Tables) -> Iterator[Tables]:
     """Tables of the drivers that make steps of a reference."""
     for command in data.get("command", {}).values():
         stepping = command.get("stepping")
         if stepping is not None and stepping.get("pulses") is None:
             yield stepping
+
+
+def _sine_table(data: Tables) -> None:
+    for stepping in _of_steppers(data):
+        stepping["table_error"] = 0.0
 
 
 def _microsteps(data: Tables) -> None:
@@ -80,38 +75,6 @@ def _microsteps(data: Tables) -> None:
             stepping["microsteps"] = own
 
 
-def _sine_table(data: Tables) -> None:
-    for stepping in _of_steppers(data):
-        stepping["table_error"] = 0.0
-
-
-def _detents(data: Tables) -> None:
-    for motor in data["motors"].values():
-        if "detent_torque" in motor:
-            motor["detent_torque"] = 0.0
-
-
-def _friction(data: Tables) -> None:
-    for motor in data["motors"].values():
-        motor["friction_torque"] = 0.0
-    for shaft in data["shafts"].values():
-        for key in ("friction_torque", "breakaway_torque", "stribeck_speed", "friction_error", "friction_curve"):
-            shaft.pop(key, None)
-    for slide in data.get("slides", {}).values():
-        for key in ("friction_force", "breakaway_force", "stribeck_speed", "friction_error", "friction_curve"):
-            slide.pop(key, None)
-    for drive in linear_drives(data):
-        drive["drag_torque"] = 0.0
-
-
-def _losses(data: Tables) -> None:
-    for gear in data["gears"].values():
-        gear["losses"] = {"kind": "constant_efficiency", "efficiency": 1.0}
-    for drive in linear_drives(data):
-        for key in SCREW_LOSSES:
-            drive.pop(key, None)
-
-
 def _quantisation(data: Tables) -> None:
     for controller in data["controllers"].values():
         for key in ("encoder", "position_encoder"):
@@ -120,60 +83,59 @@ def _quantisation(data: Tables) -> None:
                 controller[key] = kept | {"ideal": True}
 
 
-def _delay(data: Tables) -> None:
-    for controller in data["controllers"].values():
-        controller["delay"] = 0
-        for key in ("encoder", "position_encoder"):
-            if key in controller:
-                controller[key]["delay"] = 0
+def _set(*rows: tuple[str, str, Any]) -> Callable[[Tables], None]:
+    """The change that gives keys another value where tables have them: (path of the tables, keys, value); None drops the key."""
 
-
-def _of_camera(**values: Any) -> Callable[[Tables], None]:
     def change(data: Tables) -> None:
-        for controller in data["controllers"].values():
-            if "camera" in controller:
-                for key, value in values.items():
+        for path, keys, value in rows:
+            for table in _tables_at(data, path):
+                for key in set(keys.split()) & table.keys():
                     if value is None:
-                        controller["camera"].pop(key, None)
+                        del table[key]
                     else:
-                        controller["camera"][key] = value
+                        table[key] = value
 
     return change
 
 
-def _wind(data: Tables) -> None:
-    for shaft in data["shafts"].values():
-        if shaft.get("torque", {}).get("wind") is not None:
-            shaft["torque"].pop("wind")
+def _tables_at(data: Tables, path: str) -> Iterator[Tables]:
+    """The tables at a dotted path, in which ``*`` stands for each name and ``|`` parts alternatives."""
+    first, _, rest = path.partition(".")
+    for key in data if first == "*" else first.split("|"):
+        if isinstance(inner := data.get(key), dict):
+            yield from _tables_at(inner, rest) if rest else [inner]
 
 
+DRIVES = f"{'|'.join(LINEAR_DRIVES)}.*"
+ENCODERS = "controllers.*.encoder|position_encoder"
 CAUSES: dict[str, Callable[[Tables], None]] = {
     "backlash": _backlash,
     "low stiffness": _low_stiffness,
-    "hysteresis": _hysteresis,
-    "transmission error": _transmission_error,
+    "hysteresis": _set(("gears.*", "hysteresis", None), (DRIVES, "hysteresis", None)),
+    "transmission error": _set(("gears.*", "transmission_error", None), (DRIVES, "pitch_error", None)),
     "microsteps": _microsteps,
     "sine table of the driver": _sine_table,
-    "detents": _detents,
-    "dry friction": _friction,
-    "losses of the gears": _losses,
+    "detents": _set(("motors.*", "detent_torque", 0.0)),
+    "dry friction": _set(
+        ("motors.*", "friction_torque", 0.0),
+        ("shafts.*", f"friction_torque breakaway_torque {LAWS}", None),
+        ("slides.*", f"friction_force breakaway_force {LAWS}", None),
+        (DRIVES, "drag_torque", 0.0),
+    ),
+    "losses of the gears": _set(("gears.*", "losses", NO_LOSSES), (DRIVES, SCREW_LOSSES, None)),
     "encoder steps": _quantisation,
-    "delay": _delay,
-    "latency of the camera": _of_camera(latency=0.0),
-    "noise of the camera": _of_camera(noise=0.0),
-    "pixels": _of_camera(pixel=None, pixel_parts=1),
-    "wind": _wind,
+    "delay": _set(("controllers.*", "delay", 0), (ENCODERS, "delay", 0)),
+    "latency of the camera": _set(("controllers.*.camera", "latency", 0.0)),
+    "noise of the camera": _set(("controllers.*.camera", "noise", 0.0)),
+    "pixels": _set(("controllers.*.camera", "pixel", None), ("controllers.*.camera", "pixel_parts", 1)),
+    "wind": _set(("shafts.*.torque", "wind", None)),
 }
 """how each is taken out of the tables of a scenario"""
 
 
-def _on_motor(data: Tables) -> None:
-    for controller in data["controllers"].values():
-        controller.pop("position_encoder", None)
-        controller.pop("blend_time", None)
-
-
-VARIANTS: dict[str, Callable[[Tables], None]] = {"encoders on the motors": _on_motor}
+VARIANTS: dict[str, Callable[[Tables], None]] = {
+    "encoders on the motors": _set(("controllers.*", "position_encoder blend_time", None))
+}
 """other controllers of the same axes"""
 
 
