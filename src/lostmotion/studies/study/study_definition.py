@@ -3,7 +3,7 @@
 import itertools
 import math
 from collections.abc import Callable, Mapping
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Annotated, Any, ClassVar, Literal, Self, TypeVar
 
 import numpy as np
 from pydantic import Field, PrivateAttr, model_validator
@@ -14,6 +14,7 @@ from ...errors import InputError
 from ...inputs.part import Part
 from ...inputs.quantities import Whole
 from ...inputs.refusal_messages import did_you_mean, listed
+from ...model.gearbox import Gearbox
 from ...model.motor import Motor
 from ...model.process_loads import HoldingBrake
 from ...simulation.scenario.scenario import Scenario
@@ -35,11 +36,8 @@ from .task_keys import COMMON, with_value
 from .vary import Vary, base_value, check_key, check_spelling, scaled, with_keys_of_tables
 
 MAX_RUNS = 100_000_000
-
-
 MAX_BASES = 100  # with other records, that are kept
-
-
+T = TypeVar("T")
 OWN_COLUMNS = ("run", "error", "switchings", "violated", "why", "not judged", ESTIMATED)
 
 
@@ -74,7 +72,6 @@ class Study(Part):
     of_tables: ClassVar[Callable[[dict[str, Any]], "Study"]]
     """makes the study of the tables of a task; set by `task_file`, which knows them"""
     _bases: dict[tuple[Any, ...], Scenario] = PrivateAttr(default_factory=dict)
-    _vocabulary: Vocabulary | None = PrivateAttr(default=None)
     _kept: dict[Any, Any] = PrivateAttr(default_factory=dict)
 
     @model_validator(mode="before")
@@ -134,20 +131,15 @@ class Study(Part):
         if not own:
             return self, row
         values = [(k, float(row[k])) for k in own if not math.isnan(row[k])]
-        key = ("at", *values)
-        if key not in self.kept:
+
+        def made() -> Study:
             tables = self.task_tables
             for k, value in values:
                 tables = with_value(tables, self.vary[k].model_dump(), value)
             entries = [v for k, v in enumerate(tables["vary"]) if k not in own]
-            try:
-                self.kept[key] = type(self).of_tables({**tables, "vary": entries})
-            except InputError as error:
-                self.kept[key] = error
-        found = self.kept[key]
-        if isinstance(found, InputError):
-            raise found
-        return found, np.delete(row, own)
+            return type(self).of_tables({**tables, "vary": entries})
+
+        return self.once(("at", *values), made), np.delete(row, own)
 
     def _check_names(self) -> None:
         titles = [v.title for v in self.vary]
@@ -270,9 +262,7 @@ class Study(Part):
     @property
     def vocabulary(self) -> Vocabulary:
         """Names that its expressions may use."""
-        if self._vocabulary is None:
-            self._vocabulary = vocabulary_of(self.scenario)
-        return self._vocabulary
+        return self.once(("vocabulary",), lambda: vocabulary_of(self.scenario))
 
     def scenario_at(self, row: np.ndarray) -> Scenario:
         """The scenario of one run, by its row of `parameters`; of a task under gains by rule.
@@ -295,28 +285,24 @@ class Study(Part):
         one, row = self.at(row)
         if one is not self:
             return one.axis_at(row, cycles)
-        motor, gearbox = self.part("motor", row), self.part("gearbox", row)
+        motor, gearbox_alone = self.part("motor", row), self.part("gearbox", row)
+        gearbox = gearbox_alone
         if self._task.linear is not None and not self.slides_itself(row):
-            gearbox = self._with_stage(gearbox, row)
+            keys = self.part_key("gearbox", row), self.part_key(str(self._task.stage_kind), row)
+            gearbox = self.once(keys, lambda: together(gearbox_alone, self.part("stage", row)))
         return axis_scenario(self.base_of(row), motor, gearbox, self._task, cycles)
 
     def base_of(self, row: np.ndarray) -> Scenario:
         """The base of a row of a task: of a linear motor with the scale alone, and the weight of its coils on the guide."""
         if not self.slides_itself(row):
             return self.scenario
-        key = ("base", self.part_key("motor", row))
-        if key not in self.kept:
+
+        def made() -> Scenario:
             assert self._task.linear is not None
             base, coils = with_scale_alone(self.scenario), float(self.part("motor", row).rotor_inertia)
-            self.kept[key] = base.model_copy(update={"load": self._task.linear.carrying(base.load, coils)})
-        return self.kept[key]  # type: ignore[no-any-return]
+            return base.model_copy(update={"load": self._task.linear.carrying(base.load, coils)})
 
-    def _with_stage(self, gearbox: Any, row: np.ndarray) -> Any:
-        """A gearbox and the stage of a row behind it as one, made once."""
-        keys = self.part_key("gearbox", row), self.part_key(str(self._task.stage_kind), row)
-        if keys not in self.kept:
-            self.kept[keys] = together(gearbox, self.part("stage", row))
-        return self.kept[keys]
+        return self.once(("base", self.part_key("motor", row)), made)
 
     def whole_drive(self, row: np.ndarray) -> tuple[str, int] | None:
         """Key and place in `vary` of the whole drive of a row of a task; None of a pair of motor and gearbox."""
@@ -345,21 +331,30 @@ class Study(Part):
         """
         linear = None if self.axis is None else self.axis.linear
         key = self.part_key(linear.kind if kind == "stage" and linear is not None and linear.kind else kind, row)
-        if key not in self.kept:
-            if kind in ("gearbox", "motor") and (whole := self.whole_drive(row)) is not None:
-                self._keep_whole(*whole, row)
-            elif kind == "stage":
-                assert linear is not None
-                assert linear.kind is not None
-                names = [self.vary[k].value(number) for k, number in key[1:]]
-                self.kept[key] = stage_of(linear.kind, {"from": names[0], **linear.stage} if names else linear.stage)
-            elif kind == "motor" and self.axis is not None and (stepper := self._stepper(key[1:])) is not None:
-                self.kept[key] = self.axis.fed(stepper, self.brake(row))
-            else:
-                found = getattr(self.scenario_with(dict(key[1:])), kind)
-                motor = kind == "motor" and self.axis is not None
-                self.kept[key] = self._under(self.axis, found, self.brake(row)) if motor else found  # type: ignore[arg-type]
-        return self.kept[key]
+        return self.once(key, lambda: self._made(kind, key[1:], row))
+
+    def _made(self, kind: str, parameters: tuple[tuple[int, float], ...], row: np.ndarray) -> Any:
+        task = self.axis
+        if kind in ("gearbox", "motor") and (whole := self.whole_drive(row)) is not None:
+            motor, gearbox = self.once(("whole", *parameters), lambda: self._whole(*whole, row))
+            return motor if kind == "motor" else gearbox
+        if kind == "stage":
+            assert task is not None
+            assert task.linear is not None
+            assert task.linear.kind is not None
+            names = [self.vary[k].value(number) for k, number in parameters]
+            return stage_of(task.linear.kind, {"from": names[0], **task.linear.stage} if names else task.linear.stage)
+        if kind == "motor" and task is not None:
+            stepper = self._stepper(parameters)
+            return (
+                task.fed(stepper, self.brake(row))
+                if stepper is not None
+                else self._under(task, self._varied(kind, parameters), self.brake(row))
+            )
+        return self._varied(kind, parameters)
+
+    def _varied(self, kind: str, parameters: tuple[tuple[int, float], ...]) -> Any:
+        return getattr(self.scenario_with(dict(parameters)), kind)
 
     def _stepper(self, parameters: tuple[tuple[int, float], ...]) -> Motor | None:
         """The stepper of a row of a task; None of another motor."""
@@ -382,13 +377,12 @@ class Study(Part):
             raise InputError('"of the motor" needs the record of a motor; give torque and inertia', "task.brake")
         return HoldingBrake(**built_in_brake(record.name))
 
-    def _keep_whole(self, kind: str, k: int, row: np.ndarray) -> None:
-        """Keeps motor and gearbox of a whole drive."""
+    def _whole(self, kind: str, k: int, row: np.ndarray) -> tuple[Motor, Gearbox]:
+        """Motor and gearbox of a whole drive."""
         task = self._task
         beside, friction = task.whole.get(kind, {}), 0.0 if task.linear is None else task.linear.guide_friction
         motor, gearbox = whole_drive(kind, str(self.vary[k].value(row[k])), beside, friction or 0.0)
-        self.kept[self.part_key("gearbox", row)] = gearbox
-        self.kept[self.part_key("motor", row)] = task.fed(motor, None if kind == "linear_motor" else self.brake(row))
+        return task.fed(motor, None if kind == "linear_motor" else self.brake(row)), gearbox
 
     def _under(self, task: AxisTask, motor: Motor, brake: HoldingBrake | None) -> Motor:
         """A motor as the supply of a task feeds it."""
@@ -454,6 +448,18 @@ class Study(Part):
     def kept(self) -> dict[Any, Any]:
         """Common values of its runs, made once."""
         return self._kept
+
+    def once(self, key: tuple[Any, ...], make: Callable[[], T]) -> T:
+        """Value that is made at most once, or the error in its place."""
+        if key not in self._kept:
+            try:
+                self._kept[key] = make()
+            except InputError as error:
+                self._kept[key] = error
+        found = self._kept[key]
+        if isinstance(found, InputError):
+            raise found.with_traceback(None)
+        return found  # type: ignore[no-any-return]
 
     @property
     def kept_units(self) -> dict[str, str]:
