@@ -8,7 +8,7 @@ import pytest
 
 import lostmotion as lm
 from lostmotion.model.losses import efficiency_map
-from lostmotion.reports.study_selection import show_selection
+from lostmotion.reports.study_selection import SelectionReport
 from lostmotion.studies.runs.axis_pairs import HOLDS, Axes, run_axes
 from lostmotion.studies.runs.read_table import read_table
 from lostmotion.studies.runs.run_study import study
@@ -126,7 +126,7 @@ def test_what_is_no_candidate_is_refused(sheets: Path, given: dict[str, Any], sa
 def test_sums_over_the_parts(sheets: Path, tmp_path: Path):
     task = task_with(sheets, {}, {"objectives": {"mass": "least", "price": "least"}}, gearbox="sheets/both.toml", motor="sheets/")
     rows = read_table(study(task, tmp_path / "rows"))
-    table = next(part for part in show_selection(rows, task).parts if getattr(part, "title", "") == "Candidates that fit")
+    table = next(part for part in SelectionReport(rows, task).parts() if part.title == "Candidates that fit")
     shown = dict(zip(table.header, table.rows[0], strict=True))
     assert [float(shown[key]) for key in ("length [mm]", "lead time [days]")] == pytest.approx([220.0, 40.0])
     ranked = candidates(rows, task)

@@ -214,7 +214,7 @@ def test_the_points_of_the_pareto_front_are_numbered_within_the_axes_and_named_b
     ranked = candidates(table, study)
     assert study.select is not None
     front = pareto_front(ranked, study.select)
-    figure = pareto_figure(table, ranked, front, study)
+    figure = pareto_figure(table, study)
     FigureCanvasAgg(figure).draw()
     (axes,) = figure.axes
     assert [text.get_text() for text in axes.texts] == [str(k) for k in range(1, len(front) + 1)]

@@ -5,16 +5,16 @@ from types import SimpleNamespace
 
 import pytest
 
-from lostmotion.reports.study_selection import _verdict
+from lostmotion.reports.study_selection import SelectionReport
 from lostmotion.studies.runs.axis_pairs import HOLDS
-from lostmotion.studies.selection.ranking import NOT_RUN, RankedCandidate, prices
+from lostmotion.studies.selection.ranking import NOT_RUN, RankedCandidate
 from lostmotion.studies.study.drive_check_columns import NO_DATA, UNSTABLE
 from lostmotion.studies.study.select_table import Selection
 from lostmotion.verdict import Verdict
 
 pa = pytest.importorskip("pyarrow")
 SELECT = Selection(objectives={"mass": "least"})
-STUDY = SimpleNamespace(select=SELECT)
+STUDY = SimpleNamespace(select=SELECT, axis=None)
 
 
 def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "") -> RankedCandidate:
@@ -24,7 +24,7 @@ def candidate(run: int, *violated: str, not_judged: str = "", estimated: str = "
 
 def verdict(*ranked: RankedCandidate) -> Verdict:
     table = pa.table({"mass": [c.values["mass"] for c in ranked]})
-    return _verdict(table, list(ranked), prices(list(ranked), SELECT), STUDY, [])
+    return SelectionReport(table, STUDY, list(ranked)).verdict
 
 
 CASES: list[tuple[list[RankedCandidate], tuple[str, int], str]] = [

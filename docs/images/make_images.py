@@ -14,7 +14,6 @@ from lostmotion.reports.panels import Curve, Panel
 from lostmotion.reports.rig import panels
 from lostmotion.reports.study_selection import pareto_figure
 from lostmotion.studies.runs.read_table import read_table
-from lostmotion.studies.selection.ranking import candidates, pareto_front
 from lostmotion.test_rig.measurement import measure
 
 HERE = Path(__file__).parent
@@ -48,8 +47,7 @@ def tutorial() -> None:
 def selection(study: lm.studies.Study, name: str) -> None:
     with tempfile.TemporaryDirectory() as directory:
         table = read_table(lm.study(study, Path(directory) / "selection"))
-    ranked = candidates(table, study)
-    figure = pareto_figure(table, ranked, pareto_front(ranked, study.select), study)
+    figure = pareto_figure(table, study)
     figure.savefig(HERE / name, dpi=110, metadata={"Software": None})
 
 

@@ -18,7 +18,7 @@ from ..verdict import Verdict
 from .figure_style import PALETTE
 from .page import Prose, Report, Table
 from .panels import Bars, Curve, Group, Histogram, Panel
-from .study_selection import show_selection, shown_in, words
+from .study_selection import SelectionReport, shown_in, words
 from .written_files import table_csv, write_report
 
 if TYPE_CHECKING:
@@ -190,10 +190,9 @@ def _counted(table: pa.Table, study: Study) -> str:
 
 def _task_page(study: Study, table: pa.Table, name: str) -> Report:
     """Page of a task: its ranking alone, since the varied values are names."""
-    shown = show_selection(table, study)
-    main, parts = _with_main(shown.parts)
+    shown = SelectionReport(table, study)
     lead = f"Selection of motor and gearbox for the task `{name}`: {_counted(table, study)}."
-    return Report(study.title or name, lead, shown.verdict, main, tuple(parts), FILE, shown.tables)
+    return Report(study.title or name, lead, shown.verdict, shown.chart, tuple(shown.parts()), FILE, shown.files())
 
 
 FILE = "study.html"
@@ -239,21 +238,14 @@ def _study_page(study: Study, table: pa.Table, name: str) -> Report:
         )
     main, verdict = distributions(table, study), _result(table, study, ranks, indices)
     if study.select is not None:  # its chart and its tables come before the spread of the values
-        selected = show_selection(table, study)
-        tables, verdict = tables | selected.tables, selected.verdict
-        parts = [*_with_main(selected.parts)[1], main, *parts]
-        main = _with_main(selected.parts)[0]
+        selected = SelectionReport(table, study)
+        tables, verdict = tables | selected.files(), selected.verdict
+        main, parts = selected.chart, [*selected.parts(), main, *parts]
     if failures:
         parts.append(Prose("Runs that failed", failures, listed=True))
     lead = f"Study `{name}`: {_counted(table, study)}."
     kept = [part for part in parts if not isinstance(part, Group) or part.charts]
     return Report(study.title or name, lead, verdict, main, tuple(kept), FILE, tables)
-
-
-def _with_main(parts: Sequence[Table | Group]) -> tuple[Group, Sequence[Table | Group]]:
-    """The chart of a selection, which may have none, and its other parts."""
-    first, *rest = parts
-    return (first, rest) if isinstance(first, Group) else (Group("none", "", "", ()), parts)
 
 
 def _result(
@@ -292,14 +284,11 @@ def summary(directory: Path) -> tuple[list[str], Verdict | None]:
     """
     need("pyarrow", "Showing a study", "study")
     study, table = study_of(directory), read_table(directory)
-    if study.axis is not None:
-        shown = show_selection(table, study)
-        return [study.title, *shown.lines], shown.verdict
-    lines = _study_lines(study, table, directory.resolve().name)
+    lines = [study.title] if study.axis is not None else _study_lines(study, table, directory.resolve().name)
     if study.select is None:
         return lines, None
-    shown = show_selection(table, study)
-    return [*lines, *shown.lines], shown.verdict
+    shown = SelectionReport(table, study)
+    return [*lines, *shown.lines()], shown.verdict
 
 
 def write_study(directory: Path, target: Path, pictures: Sequence[str] = ()) -> Path:
