@@ -22,7 +22,7 @@ from .finding import Finding, Findings
 from .gearbox_check import input_speeds, loads, locks, loss_map
 from .life import HOUR, AxialLoad, screw_life
 from .motion_check import end_stop, resonances
-from .motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
+from .motor_check import command_of_run, motor_rules
 from .motor_quantities import oriented_amplitudes
 from .power_off import holdings
 from .rules_of_one_axis import axis_rules
@@ -214,13 +214,10 @@ def _motor(scenario: Scenario, name: str, result: RunArrays) -> tuple[list[Findi
         result, scenario.task.cycle, speed=speed, motor_torque=torque, output_torque=torque, heating=heating
     )
     slides = train.is_slide(motor.shaft)
-    findings = [
-        largest_speed(motor, float(abs(w).max()), where, slides=slides),
-        *peak_torque(motor, T, where, slides=slides),
-        *heat(motor, cycle, scenario.task.ambient_temperature, where, slides=slides, whole=oriented is not None),
-        voltage(motor, command, T, w, where, oriented=None if oriented is None else oriented[1]),
-        current(motor, T, where, oriented=None if oriented is None else oriented[0]),
-    ]
+    ambient, of_phase = scenario.task.ambient_temperature, oriented is not None
+    findings = motor_rules(
+        motor, cycle, ambient, command, T, w, where, slides=slides, whole=of_phase, oriented=oriented
+    )
     findings = [_with_sinking(scenario, f, result, cycle) if f.rule in MEANS else f for f in findings]
     if slides:
         findings = [replace(f, remark=OF_LINEAR_MOTORS) if f.verdict == "unknown" else f for f in findings]

@@ -8,7 +8,7 @@ from ..control.axis import driven
 from ..control.continuous import ContinuousController
 from ..control.controller import Controller
 from ..control.loops import FirstOrderCurrent
-from ..model.motor import Motor
+from ..model.motor import Motor, MotorLimits
 from ..units.practical import ROUNDING, RPM, told_apart
 from .catalogue_formulas import WARM
 from .duty_cycle import DutyCycle
@@ -18,33 +18,58 @@ from .winding_temperature import TwoBodies, mean_square, steady_rise
 WHOLE = ", that heats as the whole current"
 
 
+def limits_of(m: Motor) -> MotorLimits:
+    """Limits of a motor; none of them where its table has no limits."""
+    return m.limits or MotorLimits()
+
+
+def motor_rules(
+    m: Motor,
+    cycle: DutyCycle,
+    ambient: float,
+    command: np.ndarray,
+    torque: np.ndarray,
+    speed: np.ndarray,
+    where: str = "motor",
+    *,
+    slides: bool = False,
+    rise: float | None = None,
+    whole: bool = False,
+    oriented: tuple[np.ndarray, np.ndarray] | None = None,
+) -> list[Finding]:
+    """All rules of a motor but those of steppers: speed, peak torque, heat, voltage and current of a motion.
+
+    command, torque, speed: E_C [-], torque [N·m] and speed [rad/s] of the motor, of a slide force [N] and speed [m/s].
+    where: table of the motor.
+    oriented: current and voltage of a phase under field-oriented control [A, V], amplitudes.
+    ambient, slides, rise, whole: as in `heat`.
+    """
+    current_of_phase, voltage_of_phase = oriented or (None, None)
+    return [
+        largest_speed(m, float(np.abs(speed).max()), where, slides=slides),
+        *_peak_torque(m, torque, where, slides=slides),
+        *heat(m, cycle, ambient, where, rise=rise, slides=slides, whole=whole),
+        voltage(m, command, torque, speed, where, oriented=voltage_of_phase),
+        current(m, torque, where, oriented=current_of_phase),
+    ]
+
+
 def largest_speed(m: Motor, speed: float, where: str = "motor", *, slides: bool = False) -> Finding:
     """speed: the largest of the run [rad/s], of a motor that moves a slide [m/s]. where: the table of the motor."""
-    limit = m.limits.max_speed if m.limits else None
-    factor, unit, what = (
-        (1.0, "m/s", "speed, largest") if slides else (RPM, "rpm", "input speed, largest, for the motor")
-    )
-    return within(
-        "max_motor_speed",
-        what,
-        factor * speed,
-        None if limit is None else factor * limit,
-        unit,
-        "largest speed of the motor",
-        key=f"{where}.limits.max_speed",
-    )
+    limit, name, key = limits_of(m).max_speed, "largest speed of the motor", f"{where}.limits.max_speed"
+    if slides:
+        return within("max_motor_speed", "speed, largest", speed, limit, "m/s", name, key=key)
+    what = "input speed, largest, for the motor"
+    return within("max_motor_speed", what, RPM * speed, None if limit is None else RPM * limit, "rpm", name, key=key)
 
 
-def peak_torque(m: Motor, torque: np.ndarray, where: str = "motor", *, slides: bool = False) -> list[Finding]:
+def _peak_torque(m: Motor, torque: np.ndarray, where: str, *, slides: bool) -> list[Finding]:
     """The largest of the run [N·m], of a motor that moves a slide [N]; nothing where no limit is known, as the limit of the current then judges."""
-    limit = m.limits.peak_torque if m.limits else None
-    if limit is None:
-        return []
-    key = f"{where}.limits.peak_torque"
-    largest = float(abs(torque).max())
+    limit = limits_of(m).peak_torque
     word, unit = ("force", "N") if slides else ("torque", "N·m")
-    what, name = f"motor {word}, largest", f"peak {word} of the motor"
-    return [within("motor_peak_torque", what, largest, limit, unit, name, key=key)]
+    what, name, key = f"motor {word}, largest", f"peak {word} of the motor", f"{where}.limits.peak_torque"
+    found = within("motor_peak_torque", what, float(np.abs(torque).max()), limit, unit, name, key=key)
+    return [] if limit is None else [found]
 
 
 def heat(
@@ -60,28 +85,18 @@ def heat(
     """Torque over the cycle, and the temperature of the winding at this ambient temperature [°C]. `rise` [K] is the
     rise over it, if it is known already. `slides`: the motor moves a slide, by a force. `whole`: the torque of the cycle heats as
     the whole current does, under field-oriented control."""
-    limits = m.limits
+    limits = limits_of(m)
     word, unit = ("force", "N") if slides else ("torque", "N·m")
     torque = cycle.rms_motor_torque
-    continuous = None if limits is None else limits.continuous_torque
+    continuous = limits.continuous_torque
     if continuous is None and m.kind != "torque_source":  # other limits do not say that there is none
         continuous = m.rated_torque
     name = f"continuous {word} of the motor"
     key = f"{where}.limits.continuous_torque"
-    findings = [
-        within(
-            "motor_torque",
-            f"motor {word}, rms{WHOLE if whole else ''}",
-            torque,
-            continuous,
-            unit,
-            name,
-            key=key,
-            cycle=cycle,
-        )
-    ]
+    what = f"motor {word}, rms{WHOLE if whole else ''}"
+    findings = [within("motor_torque", what, torque, continuous, unit, name, key=key, cycle=cycle)]
     what = "winding temperature"
-    permissible = None if limits is None else limits.max_winding_temperature
+    permissible = limits.max_winding_temperature
     if rise is None and permissible is not None:
         rise = _rise(m, cycle, torque, ambient)
     if permissible is None or rise is None or m.copper_loss() is None:
@@ -118,8 +133,7 @@ def _rise(m: Motor, cycle: DutyCycle, torque: float, ambient: float) -> float | 
 
 def rms_rise(m: Motor, torque: float, ambient: float) -> float | None:
     """Rise of the winding over the ambient [K] in the long run under an rms torque [N·m]; None if unknown."""
-    copper = m.copper_loss()
-    resistance = None if m.limits is None else m.limits.winding_to_ambient
+    copper, resistance = m.copper_loss(), limits_of(m).winding_to_ambient
     if copper is None or resistance is None:
         return None
     loss, reference = copper
@@ -172,9 +186,7 @@ def current_voltage_power(
         else:  # a torque source gives what it takes, but for the voltage of L_q di_q/dt
             u_q = phase.resistance * i + phase.voltage_constant * speed
         return i, np.asarray(phase.voltage(u_q, torque, speed)), 1.5 * u_q * i
-    limits = m.limits
-    k = None if limits is None else limits.torque_constant
-    R = None if limits is None else limits.resistance
+    k, R = limits_of(m).torque_constant, limits_of(m).resistance
     current = unknown if k is None else torque / k
     if m.kind == "dc" and m.rated_voltage is not None:
         voltage = m.rated_voltage * command
@@ -194,7 +206,6 @@ def voltage(
 ) -> Finding:
     """The largest that the command asks for, or that torque [N·m] and speed [rad/s] need; under field-oriented control the one
     that a phase had [V]."""
-    limits = m.limits
     peak = float(abs(current_voltage_power(m, command, torque, speed)[1] if oriented is None else oriented).max())
     if m.winding is not None:
         limit = None if m.dc_voltage is None else m.phase_voltage
@@ -205,7 +216,7 @@ def voltage(
     if math.isnan(peak):
         missing = f"{where}.limits.resistance and {where}.limits.torque_constant are missing"
         return Finding("voltage", "voltage, largest", "not known", "unknown", missing)
-    limit = (m.voltage_limit if m.kind == "dc" else None) or (limits.max_voltage if limits else None)
+    limit = (m.voltage_limit if m.kind == "dc" else None) or limits_of(m).max_voltage
     key = f"{where}.voltage_limit" if m.kind == "dc" else f"{where}.limits.max_voltage"
     of = "" if m.kind == "dc" else f", of a DC motor with {where}.limits.torque_constant"
     return within("voltage", f"voltage, largest{of}", peak, limit, "V", "limit of the amplifier", key=key)
@@ -218,14 +229,14 @@ def amperes_of(m: Motor, where: str) -> str:
 
 def current(m: Motor, torque: np.ndarray, where: str = "motor", *, oriented: np.ndarray | None = None) -> Finding:
     """The largest of the run, for its torque [N·m]; under field-oriented control the one that a phase had [A], amplitude."""
-    limits = m.limits
+    limits = limits_of(m)
     if m.winding is not None:
         amplitude = torque / m.winding.phase_values().torque_constant if oriented is None else oriented
         rms = float(abs(amplitude).max()) / math.sqrt(2.0)
         name, key = "limit of motor and amplifier", f"{where}.winding.max_current_rms"
         what = "current of a phase, largest, as effective value"
         return within("current", what, rms, m.winding.max_current, "A rms", name, key=key)
-    if limits is None or limits.torque_constant is None:
+    if limits.torque_constant is None:
         missing = f"{where}.limits.torque_constant is missing"
         return Finding("current", "current, largest", "not known", "unknown", missing)
     peak = float(abs(torque).max()) / limits.torque_constant

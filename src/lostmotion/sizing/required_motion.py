@@ -17,7 +17,7 @@ from .duty_cycle import DutyCycle
 from .finding import Finding
 from .gearbox_check import input_speeds, loads
 from .motion_check import INERTIA_RATIO, inertia_ratio
-from .motor_check import current, heat, largest_speed, needed_command, peak_torque, rms_rise, voltage
+from .motor_check import motor_rules, needed_command, rms_rise
 from .stepper_check import speed_of_stepper, step_resonance, torque_reserve
 
 POINTS = 1000  # of a cycle at least
@@ -188,11 +188,6 @@ def check_motor(
             inertia_ratio(motor, demand.whole, load_inertia, largest),
         ]
     rise = rms_rise(motor, cycle.rms_motor_torque, ambient)
-    return [
-        largest_speed(motor, cycle.peak_input_speed, slides=slides),
-        *peak_torque(motor, torque, slides=slides),
-        *heat(motor, cycle, ambient, rise=rise, slides=slides),
-        voltage(motor, needed_command(motor, torque, demand.speed), torque, demand.speed),
-        current(motor, torque),
-        *([] if slides else [inertia_ratio(motor, demand.whole, load_inertia, largest)]),
-    ]
+    command = needed_command(motor, torque, demand.speed)
+    found = motor_rules(motor, cycle, ambient, command, torque, demand.speed, slides=slides, rise=rise)
+    return found if slides else [*found, inertia_ratio(motor, demand.whole, load_inertia, largest)]

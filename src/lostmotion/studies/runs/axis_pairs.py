@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
@@ -41,7 +40,7 @@ from ...sizing.finding import Finding
 from ...sizing.gearbox_check import input_speeds, loads, lost_motion
 from ...sizing.linear_stage_demands import Stage, at_input, together
 from ...sizing.motion_check import ratio_of_inertias
-from ...sizing.motor_check import command_of_run, current, heat, largest_speed, peak_torque, voltage
+from ...sizing.motor_check import command_of_run, motor_rules
 from ...sizing.motor_quantities import oriented_amplitudes
 from ...sizing.required_motion import (
     InputDemand,
@@ -63,7 +62,6 @@ HOLDS = "holds from the least to the largest losses of its kind"
 """verdict on a gearbox with estimated losses that none of them turns"""
 
 ResultRow = dict[str, Any]
-T = TypeVar("T")
 
 
 @dataclass
@@ -83,24 +81,12 @@ class Axes:
         base, task = self.study.base_of(row), self.task
         of_coils = self.study.part_key("motor", row) if self.study.slides_itself(row) else ()
         key = ("motion", of_coils)
-        return self._once(key, lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise))
-
-    def _once(self, key: tuple[Any, ...], make: Callable[[], T]) -> T:
-        """Value that is made at most once, or the error in its place."""
-        kept = self.study.kept
-        if key not in kept:
-            try:
-                kept[key] = make()
-            except InputError as error:
-                kept[key] = error
-        if isinstance(kept[key], InputError):
-            raise kept[key].with_traceback(None)
-        return kept[key]  # type: ignore[no-any-return]
+        return self.study.once(key, lambda: required_motion(reference_of(base), base.load, task.cycle, task, task.rise))
 
     def gearbox(self, row: np.ndarray) -> tuple[InputDemand, list[Finding]]:
         """Demands on the input of the gearbox, and the rules for it and for the stage behind it."""
         key = ("demand", self.study.part_key("gearbox", row), self._stage_key(row))
-        return self._once(key, lambda: self._demand(row))
+        return self.study.once(key, lambda: self._demand(row))
 
     def _stage_key(self, row: np.ndarray) -> Any:
         kind = self.task.stage_kind
@@ -110,7 +96,7 @@ class Axes:
         """The last stage of a linear axis, the motion of its shaft and what its rules say; None of a rotary load."""
         if self.task.linear is None or self.study.slides_itself(row):
             return None
-        return self._once(("stage motion", self._stage_key(row)), lambda: self._stage(row))
+        return self.study.once(("stage motion", self._stage_key(row)), lambda: self._stage(row))
 
     def _stage(self, row: np.ndarray) -> tuple[Stage, RequiredMotion, list[Finding]]:
         stage: Stage = self.study.part("stage", row)
@@ -152,8 +138,7 @@ class Axes:
 
     def motor(self, row: np.ndarray) -> Motor:
         """The motor of a row."""
-        key = ("checked", *self.study.part_key("motor", row))
-        return self._once(key, lambda: self.study.part("motor", row))  # type: ignore[no-any-return]
+        return self.study.part("motor", row)  # type: ignore[no-any-return]
 
     def judged(self, row: np.ndarray) -> list[Finding]:
         """Findings for a pair before any run. Raises InputError: its records lack data for a run."""
@@ -321,7 +306,7 @@ class Axes:
         own: limits that the pair violates with the estimate itself.
         """
         try:
-            gearbox = self._once(("part", self.study.part_key("gearbox", row)), lambda: self.study.part("gearbox", row))
+            gearbox = self.study.part("gearbox", row)
         except InputError:
             return ""
         if gearbox.loss_range is None:
@@ -338,13 +323,13 @@ class Axes:
 
         def make() -> Axes:
             study = self.study.model_copy()
-            shared = ("motor", "checked", "motion", "stage motion", self.task.stage_kind)
+            shared = ("motor", "motion", "stage motion", self.task.stage_kind)
             # Other threads add to what is kept: a copy is made at once, and not while it changes.
             kept = {k: v for k, v in dict(self.study.kept).items() if k[0] in shared}
             study._kept = kept | {key: self.study.part("gearbox", row).with_losses(factor)}
             return Axes(study)
 
-        return self._once(("known losses", key, factor), make)
+        return self.study.once(("known losses", key, factor), make)
 
     def violated(self, row: np.ndarray) -> tuple[str, ...]:
         """Limits that a pair violates, of the rules and of the selection; the pair is run if the rules pass."""
@@ -392,22 +377,13 @@ class Axes:
             return self._with_others(row, of_motor, made)
         command = command_of_run(m, made.scenario.controller, command, torque, speed)
         oriented = oriented_amplitudes(made.scenario, result, MOTOR)
-        of_motor = [
-            largest_speed(m, duty.peak_input_speed, slides=slides),
-            *peak_torque(m, torque, slides=slides),
-            *heat(
-                m,
-                duty,
-                task.ambient_temperature,
-                slides=slides,
-                rise=None if math.isnan(winding) else winding - task.ambient_temperature,
-            ),
-            voltage(m, command, torque, speed, oriented=None if oriented is None else oriented[1][here]),
-            current(m, torque, oriented=None if oriented is None else oriented[0][here]),
-        ]
-        if oriented is not None and (amplifier := task.amplifier_of_task()) is not None:
+        of_phase = None if oriented is None else (oriented[0][here], oriented[1][here])
+        ambient = task.ambient_temperature
+        rise = None if math.isnan(winding) else winding - ambient
+        of_motor = motor_rules(m, duty, ambient, command, torque, speed, slides=slides, rise=rise, oriented=of_phase)
+        if of_phase is not None and (amplifier := task.amplifier_of_task()) is not None:
             time, bus = result.time[here], None if task.supply is None else task.supply.start()
-            whole = effective_current(m, torque, speed, oriented[0][here])
+            whole = effective_current(m, torque, speed, of_phase[0])
             of_motor += amplifier_rules(time, whole, float(time[-1] - time[0]), amplifier, bus, m)
         return self._with_others(row, of_motor, made)
 
