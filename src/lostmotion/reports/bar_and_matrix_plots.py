@@ -85,8 +85,4 @@ def _contacts(axes: Any, chart: Contacts) -> None:
 
 
 def _flows(axes: Any, chart: Flows) -> None:
-    apart = ("residual", "turned_over")
-    _bars(
-        axes,
-        Bars("", "energy [J]", {n.replace("_", " "): (e,) for n, e in chart.energies.items() if e and n not in apart}),
-    )
+    _bars(axes, Bars("", "energy [J]", {name: (e,) for name, e in chart.shown.items()}))

@@ -50,11 +50,11 @@ def _range(pair: tuple[float, float], unit: str) -> str:
     return f"{practical(low, unit)} to {practical(high, unit)}" if low > 0.0 else f"0 to {practical(high, unit)}"
 
 
-def map_panel(certificate: HuntingCertificate) -> Panel | None:
-    """The error left by a slip over the error at its start."""
+def map_panels(certificate: HuntingCertificate) -> tuple[Panel, ...]:
+    """The error left by a slip over the error at its start; none without a map."""
     found = certificate.map
     if found is None or not found.sizes["error"]:
-        return None
+        return ()
     unit, factor = ("µm", 1e6) if found["error"].attrs["units"] == "m" else ("arcmin", 60.0 * math.degrees(1.0))
     error, image = factor * found["error"].values, factor * found["image"].values
     ends = np.array([0.0, min(error.max(), max(-image.min(), 0.5 * error.max()))])
@@ -63,21 +63,14 @@ def map_panel(certificate: HuntingCertificate) -> Panel | None:
         Mark(factor * p.amplitude, -factor * p.amplitude, f"{1.0 / p.period:.3g} Hz", look(0))
         for p in certificate.fixed_points
     )
-    return Panel(
-        "error left by a slip",
-        f"error at the break-away [{unit}]",
-        f"error left [{unit}]",
-        curves,
-        marks=marks,
-        level=0.0,
-    )
+    labels = f"error at the break-away [{unit}]", f"error left [{unit}]"
+    return (Panel("error left by a slip", *labels, curves, marks=marks, level=0.0),)
 
 
 def certificate_parts(certificate: HuntingCertificate) -> list[Table | Group]:
     """The certificate as parts of the report of a sampled axis."""
-    panel = map_panel(certificate)
     table = Table("Certificate of hunting", ("quantity", "value"), certificate_rows(certificate), SAMPLED)
-    return [table, *([Group("hunting", "From break-away to break-away", WITHOUT_STEPS, (panel,), 1)] if panel else [])]
+    return [table, Group("hunting", "From break-away to break-away", WITHOUT_STEPS, map_panels(certificate), 1)]
 
 
 def verdict_of(certificate: HuntingCertificate) -> Verdict:
@@ -89,13 +82,12 @@ def verdict_of(certificate: HuntingCertificate) -> Verdict:
 def certificate_report(name: str, title: str, certificate: HuntingCertificate) -> Report:
     """The page of a certificate."""
     rows = certificate_rows(certificate)
-    panel = map_panel(certificate)
+    contact = f", contact `{certificate.contact}`" if certificate.contact else ""
     return Report(
         title=title or name,
-        lead=f"Certificate of hunting of `{name}`"
-        + (f", contact `{certificate.contact}`." if certificate.contact else "."),
+        lead=f"Certificate of hunting of `{name}`{contact}.",
         verdict=verdict_of(certificate),
-        main=Group("hunting", "From break-away to break-away", CAPTION, () if panel is None else (panel,), 1),
+        main=Group("hunting", "From break-away to break-away", CAPTION, map_panels(certificate), 1),
         parts=(Table("Hunting", ("quantity", "value"), rows), Prose("What is computed", COMPUTED)),
         file="servo.html",
     )

@@ -19,6 +19,13 @@ class Contour:
     label: tuple[float, float]  # point at which the value is written
 
 
+def edges(middles: Any, *, logarithmic: bool = False) -> np.ndarray:
+    """Limits of cells about their middles, the outermost at the ends."""
+    m = np.log(middles) if logarithmic else np.asarray(middles, float)
+    limits = np.concatenate([m[:1], 0.5 * (m[1:] + m[:-1]), m[-1:]])
+    return np.asarray(np.exp(limits) if logarithmic else limits)
+
+
 def ticks(low: float, high: float, count: float, degrees: bool = False, whole: bool = False) -> list[float]:
     """Round values within an interval, about so many of them; of angles in degrees, parts and multiples of a right angle.
 

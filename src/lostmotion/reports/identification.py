@@ -97,9 +97,9 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
             Table(
                 "Values", ("parameter", "value", "from", "to", "unit", "interval"), parameter_rows(result), INTERVALS
             ),
-            *([_conditions(result)] if result.conditions else []),
-            *([_kinds(result)] if result.kinds else []),
-            *(Prose(title, texts, listed=True) for title, texts in lists.items() if texts),
+            _conditions(result),
+            _kinds(result),
+            *(Prose(title, texts, listed=True) for title, texts in lists.items()),
             *[group for group in groups if not group.name.startswith("overlays")],
             Table(
                 "Errors of each log",
@@ -107,8 +107,8 @@ def identification_report(name: str, result: IdentificationResult, *, all_logs: 
                 error_rows(result, shown=True),
                 "MAE: mean absolute error. RMSE: root mean square error. Fit: 1 - RMSE/standard deviation of the measured values.",
             ),
-            *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
-            *([Table("Notes on the logs", ("log", "note"), notes)] if notes else []),
+            Table("Logs that are left out", ("log", "reason"), left_out),
+            Table("Notes on the logs", ("log", "note"), notes),
             *[group for group in groups if group.name.startswith("overlays")],
         ),
         file="identified.html",
@@ -224,17 +224,14 @@ def _groups(result: IdentificationResult, chosen: Mapping[str, str]) -> list[Gro
     if chosen:
         caption += f" Drawn are the worst, median and best of {len(result.logs)} logs."
     found = [Group("overlays", "Logs", caption, tuple(overlays[:FIRST]))]
-    if panels := _clouds(result, table, variables):
-        logs_shown = f"{len(table)} of {len(result.logs)} logs" if len(table) < len(result.logs) else "all logs"
-        text = f"Measured less computed, {logs_shown}: a pattern here is an effect that the model lacks."
-        found.append(Group("residuals", "Residuals", text, tuple(panels)))
+    logs_shown = f"{len(table)} of {len(result.logs)} logs" if len(table) < len(result.logs) else "all logs"
+    text = f"Measured less computed, {logs_shown}: a pattern here is an effect that the model lacks."
+    found.append(Group("residuals", "Residuals", text, tuple(_clouds(result, table, variables))))
     if result.fit.free:
         found.append(_correlation_group(result))
-    if result.profiles:
-        text = "Rise of the loss with one parameter given and all others fitted again; 1.92 is the 95 % interval."
-        found.append(Group("profiles", "Profiles", text, tuple(_profile(result, name) for name in result.profiles)))
-    if laws := _laws(result, table):
-        found.append(Group("laws", "Friction, losses and torsion", LAWS, tuple(laws)))
+    text = "Rise of the loss with one parameter given and all others fitted again; 1.92 is the 95 % interval."
+    found.append(Group("profiles", "Profiles", text, tuple(_profile(result, name) for name in result.profiles)))
+    found.append(Group("laws", "Friction, losses and torsion", LAWS, tuple(_laws(result, table))))
     for n, k in enumerate(range(FIRST, len(overlays), PER_FIGURE)):
         found.append(Group(f"overlays-{n + 2}", "" if n else "Further logs", "", tuple(overlays[k : k + PER_FIGURE])))
     return found

@@ -49,7 +49,7 @@ def monitor_report(name: str, result: MonitorResult) -> Report:
                 tuple(_evidence(result, w) for w in watched if w.change is not None),
             ),
             Table("Logs", LOGS, rows, TELLS, unused),
-            *([Table("Logs that are left out", ("log", "reason"), left_out)] if left_out else []),
+            Table("Logs that are left out", ("log", "reason"), left_out),
         ),
         file="monitor.html",
         tables={"values.csv": table_csv(VALUES_OF_LOGS, _values(result)), "watched.csv": table_csv(WATCHED, table)},

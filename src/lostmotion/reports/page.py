@@ -58,6 +58,14 @@ class Prose:
     noted: bool = False  # set apart as notes
 
 
+Part = Table | Prose | Group
+
+
+def _content(part: Part) -> Sequence[object]:
+    """Rows, paragraphs or charts of a part."""
+    return part.rows if isinstance(part, Table) else part.paragraphs if isinstance(part, Prose) else part.charts
+
+
 @dataclass(frozen=True)
 class Report:
     """The parts of a page, in their order."""
@@ -67,9 +75,12 @@ class Report:
     verdict: Verdict | tuple[str, ...]
     """in at most three lines; lines alone where nothing is asked, so that there is nothing to judge"""
     main: Group
-    parts: tuple[Table | Group | Prose, ...]
+    parts: Sequence[Part]  #: parts below; empty ones are left out
     file: str = "report.html"  # its name in a directory
     tables: Mapping[str, str] = field(default_factory=dict)  # text of the CSV files beside it, by their names
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "parts", tuple(part for part in self.parts if _content(part)))
 
     def groups(self) -> list[Group]:
         """All groups of charts."""
@@ -161,7 +172,7 @@ def _text(text: str) -> str:
 def _group(group: Group, charts: list[Chart]) -> str:
     title = f"<h2>{escape(group.title)}</h2>" if group.title else ""
     about = f'<p class="about">{_text(group.caption)}</p>' if group.caption else ""
-    if not group.charts:
+    if not group.charts:  # as the first group of a report may have none
         return ""
     return f'<section id="{escape(group.name)}">{title}{about}\n{cards(group.charts, charts, group.columns)}</section>'
 
@@ -183,9 +194,7 @@ def _card(chart: Chart, charts: list[Chart], *, still: bool) -> str:
     number, svg = len(charts), svg_of(chart) if shown else ""
     charts.append(chart)
     if isinstance(chart, Flows):
-        apart = ("residual", "turned_over")
-        rows = [[n.replace("_", " "), f"{v:.4g}"] for n, v in chart.energies.items() if v and n not in apart]
-        svg = _table(Table("", ("energy", "[J]"), rows))
+        svg = _table(Table("", ("energy", "[J]"), [[name, f"{e:.4g}"] for name, e in chart.shown.items()]))
     kind = {Panel: "plot", Contacts: "strip", Flows: "energy"}.get(type(chart), "plot still")
     place = "" if isinstance(chart, Bars | Histogram | Drawing) else f' data-chart="{number}"'
     if isinstance(chart, Panel):

@@ -125,12 +125,23 @@ class Contacts:
     modes: Mapping[str, Any]
 
 
+def shown_energies(energies: Mapping[str, float]) -> dict[str, float]:
+    """Entries of a ledger that are not 0, in words, without its residual and the energy that was turned over."""
+    apart = ("residual", "turned_over")
+    return {name.replace("_", " "): e for name, e in energies.items() if e and name not in apart}
+
+
 @dataclass(frozen=True)
 class Flows:
     """Energy flows of a run [J]: sources and sinks of the ledger."""
 
     title: str
     energies: Mapping[str, float]
+
+    @property
+    def shown(self) -> dict[str, float]:
+        """Sources and sinks that take part, in words."""
+        return shown_energies(self.energies)
 
 
 @dataclass(frozen=True)

@@ -12,8 +12,8 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from . import bar_and_matrix_plots as others
-from .contours import Contour
+from . import other_plots as others
+from .contours import Contour, edges
 from .figure_style import COLOURS, INK, MATPLOTLIB, MUTED, SMALLEST, map_colours
 from .panels import Chart, Curve, Ground, Group, Mark, Matrix, Panel
 from .run_charts import figure_charts, run_charts
@@ -195,7 +195,7 @@ def _contours(axes: Any, panel: Panel, ground: Ground) -> None:
     if shown.count() == shown.size:
         mesh = axes.pcolormesh(ground.x, ground.y, shown, cmap=map_colours(), shading="gouraud")
     else:
-        sides = (_edges(ground.x, logarithmic=panel.log_x), _edges(ground.y, logarithmic=panel.log_y))
+        sides = (edges(ground.x, logarithmic=panel.log_x), edges(ground.y, logarithmic=panel.log_y))
         mesh = axes.pcolormesh(*sides, shown, cmap=map_colours())
     mesh.set_rasterized(True)
     axes.figure.colorbar(mesh, ax=axes, label=ground.label)
@@ -208,13 +208,6 @@ def draw_contours(axes: Any, lines: Iterable[Contour]) -> None:
         axes.plot(contour.x, contour.y, color=INK, linewidth=0.6)
         text = axes.annotate(contour.text, contour.label, ha="center", va="center", fontsize=SMALLEST)
         text.set_path_effects(HALO)
-
-
-def _edges(middles: Any, *, logarithmic: bool) -> Any:
-    """Limits of cells about their middles, the outermost at the ends."""
-    m = np.log(middles) if logarithmic else np.asarray(middles, float)
-    edges = np.concatenate([m[:1], 0.5 * (m[1:] + m[:-1]), m[-1:]])
-    return np.exp(edges) if logarithmic else edges
 
 
 def _range_within(curves: Iterable[Curve], x_range: tuple[float, float]) -> tuple[float, float]:

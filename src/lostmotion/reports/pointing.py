@@ -273,6 +273,9 @@ CONTRIBUTED = (
 )
 
 
+ROBUSTNESS = "Error with wrong losses in the controller, at other temperatures, and with wear."
+
+
 def _computed(budget: PointingBudget) -> Prose:
     return Prose(
         "Method",
@@ -289,7 +292,7 @@ def _computed(budget: PointingBudget) -> Prose:
 
 def pointing_report(name: str, budget: PointingBudget) -> Report:
     """The page of a pointing budget."""
-    errors, speed, robustness = error_panels(budget), speed_panels(budget), robustness_panels(budget)
+    errors, speed = error_panels(budget), speed_panels(budget)
     main = Group(
         "errors",
         "Errors over time",
@@ -299,22 +302,20 @@ def pointing_report(name: str, budget: PointingBudget) -> Report:
     )
     rows, parts = budget_rows(budget), contribution_rows(budget)
     as_it_is = frozenset(k for k, row in enumerate(rows) if row[1] == "as it is")
-    more: list[Table | Group | Prose] = [Table("Budget", header(budget), rows, BUDGET, chosen=as_it_is)]
-    if parts:
-        more += [_bars(budget), Table("Contributions", contribution_header(budget), parts)]
-    if by_order := order_rows(budget):
-        more.append(Table("Error at constant speed by order", order_header(budget), by_order))
-    if speed:
-        more.append(Group("speed", "Error over target speed", "", tuple(speed), min(2, len(speed))))
-    if robustness:
-        caption = "Error with wrong losses in the controller, at other temperatures, and with wear."
-        more.append(Group("robustness", "Robustness", caption, tuple(robustness), 3))
     return Report(
         title=budget.scenario.title or name,
         lead=f"Pointing report of the axes of `{name}`: errors against the direction that they follow, and their causes.",
         verdict=_verdict(budget),
         main=main,
-        parts=(*more, _computed(budget)),
+        parts=(
+            Table("Budget", header(budget), rows, BUDGET, chosen=as_it_is),
+            _bars(budget),
+            Table("Contributions", contribution_header(budget), parts),
+            Table("Error at constant speed by order", order_header(budget), order_rows(budget)),
+            Group("speed", "Error over target speed", "", tuple(speed), min(2, len(speed))),
+            Group("robustness", "Robustness", ROBUSTNESS, tuple(robustness_panels(budget)), 3),
+            _computed(budget),
+        ),
         file="track.html",
         tables={
             "budget.csv": table_csv(header(budget), rows),

@@ -199,33 +199,23 @@ def response_report(responses: Mapping[str, xarray.Dataset], scenario: Scenario,
     name, response = next(iter(responses.items()))
     found = characteristics(response, scenario, output)
     source, unit = response.attrs["source"].replace("_", " "), unit_of_source(response)
-    rows = [
-        [f"{a:g}", *("" if math.isnan(v) else f"{v:.4g}" for v in values)]
-        for a, *values in zip(
-            *(found[k].values.tolist() for k in ("amplitude", "bandwidth", "phase_crossover")), strict=True
-        )
-    ]
+    names = ("amplitude", "bandwidth", "phase_crossover")
+    columns = list(zip(*(found[name].values.tolist() for name in names), strict=True))
+    rows = [[f"{a:g}", *("" if math.isnan(v) else f"{v:.4g}" for v in values)] for a, *values in columns]
     caption = f"First harmonic of the {output.replace('_', ' ')} over that of the {source}, of periodic motions."
     compared = f" Compared with {', '.join(list(responses)[1:])}." if len(responses) > 1 else ""
-    parts: list[Table | Group | Prose] = [
-        Table(
-            "Characteristics", (f"amplitude [{unit}]", "gain -3 dB at [Hz]", "phase -180 degrees at [Hz]"), rows, BLANK
-        ),
-        Prose("Motions", motion_lines(response), listed=True),
-    ]
-    if grounds := maps(response, output):
-        note = (
-            f"Gain, phase and distortion are blank where the gain is {MAP_DEPTH:g} dB or more below its largest value."
-        )
-        parts.insert(0, Group("maps", "Over frequency and amplitude", note, tuple(grounds)))
-    names = ("amplitude", "bandwidth", "phase_crossover")
-    columns = zip(*(found[name].values.tolist() for name in names), strict=True)
+    note = f"Gain, phase and distortion are blank where the gain is {MAP_DEPTH:g} dB or more below its largest value."
+    header = (f"amplitude [{unit}]", "gain -3 dB at [Hz]", "phase -180 degrees at [Hz]")
     return Report(
         title=scenario.title or name,
         lead=f"Frequency response of `{name}` from {source} to {output.replace('_', ' ')}.{compared}",
         verdict=_verdict(response, found),
         main=Group("bode", "Gain and phase", caption, tuple(bode(responses, output)), 1),
-        parts=tuple(parts),
+        parts=(
+            Group("maps", "Over frequency and amplitude", note, tuple(maps(response, output))),
+            Table("Characteristics", header, rows, BLANK),
+            Prose("Motions", motion_lines(response), listed=True),
+        ),
         file="response.html",
         tables={
             "response.csv": points_csv(response, output),

@@ -1,6 +1,7 @@
 """The report of the virtual test rig: the data sheet on the left, what is measured on the right."""
 
 from collections.abc import Iterable, Sequence
+from typing import Any
 
 import numpy as np
 
@@ -9,12 +10,13 @@ from ..data_sheets.sheet import Record
 from ..model.torsion import Rigid
 from ..test_rig.comparison import Comparison
 from ..test_rig.measurement import RigReport
+from ..test_rig.torsion_loop import Loop
 from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import ARCMIN, RPM, counted, practical
 from ..verdict import Point, Verdict
-from .data_sheet_rows import rows_of, rows_of_part
 from .figure_style import DOTS, step
-from .page import Prose, Report, Table
+from .page import Part, Prose, Report, Table
+from .written_files import table_csv
 from .panels import Curve, Group, Panel
 from .written_files import table_csv
 
@@ -37,32 +39,35 @@ def panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
     load, values = report.map["load"].values, report.map["efficiency"].values
     across = [Curve(f"load {load[j]:g}", rpm, values[j], step(k, 4)) for k, j in enumerate((2, 4, 5, 7))]
     relative, share, at_input = "relative load [-]", "efficiency [-]", "torque at the input [N·m]"
+    titles = "torsion, input locked", f"hysteresis loops (rated {report.gearbox.rated_output_torque:g} N·m)"
+    labels, printed = ("twist [arcmin]", "output torque [N·m]"), [] if sheet is None else _printed_torsion(sheet)
     return [
         Panel("efficiency over load (motor drives)", relative, share, tuple(efficiency), y_range=(0.0, 1.0)),
         Panel("efficiency over speed", "input speed [rpm]", share, tuple(across), y_range=(0.0, 1.0)),
         Panel("loss torque", relative, at_input, tuple(lost)),
         Panel("no-load running torque", "input speed [rpm]", at_input, tuple(running)),
-        *_torsion_panels(report, sheet),
+        *loading_panels(report.initial_loading, report.loops, titles, labels, ARCMIN, printed),
     ]
 
 
-def _torsion_panels(report: RigReport, sheet: GearboxSheet | None) -> list[Panel]:
-    """First loading and loops; none of a rigid gearbox."""
-    if report.initial_loading is None:
+def loading_panels(
+    first: tuple[Any, Any] | None,
+    loops: Sequence[Loop],
+    titles: tuple[str, str],
+    labels: tuple[str, str],
+    factor: float,
+    printed: Sequence[Curve] = (),
+) -> list[Panel]:
+    """First loading, beside the printed values, and loops; none of a rigid part. factor: from SI to the unit of the twist."""
+    if first is None:
         return []
-    twist, torque = report.initial_loading
-    torsion = [Curve("rig, first loading", ARCMIN * twist, torque, step(0, 4))]
-    if sheet is not None:
-        torsion += _printed_torsion(sheet)
-    loops = [
-        Curve(f"±{loop.amplitude:.3g} N·m", ARCMIN * loop.twist, loop.torque, step(k, 4))
-        for k, loop in enumerate(report.loops)
-    ]
-    angle, output, rated = "twist [arcmin]", "output torque [N·m]", report.gearbox.rated_output_torque
-    return [
-        Panel("torsion, input locked", angle, output, tuple(torsion)),
-        Panel(f"hysteresis loops (rated {rated:g} N·m)", angle, output, tuple(loops)),
-    ]
+    unit = labels[1].partition("[")[2].removesuffix("]")
+    loading = Curve("rig, first loading", factor * first[0], first[1], step(0, 4))
+    cycles = (
+        Curve(f"±{loop.amplitude:.4g} {unit}", factor * loop.twist, loop.torque, step(k, 4))
+        for k, loop in enumerate(loops)
+    )
+    return [Panel(titles[0], *labels, (loading, *printed)), Panel(titles[1], *labels, tuple(cycles))]
 
 
 def _over_load(report: RigReport, name: str) -> list[Curve]:
@@ -175,43 +180,16 @@ def percent(share: float) -> str:
     return f"{rounded:+.1f} %" if rounded else "0 %"
 
 
-def comparison_table(comparisons: Sequence[Comparison]) -> list[Table | Group | Prose]:
-    """The data of the sheet beside the measurements of the rig; nothing where there are none."""
-    if not comparisons:
-        return []
-    rows = [
-        [
-            c.quantity,
-            f"{c.catalogue:.5g}",
-            f"{c.rig:.5g}",
-            percent(c.difference),
-            "" if c.unit == "1" else c.unit,
-            c.remark,
-        ]
-        for c in comparisons
-    ]
+def comparison_table(comparisons: Sequence[Comparison]) -> Table:
+    """The data of the sheet beside the measurements of the rig."""
+    rows = []
+    for c in comparisons:
+        unit = "" if c.unit == "1" else c.unit
+        rows.append([c.quantity, f"{c.catalogue:.5g}", f"{c.rig:.5g}", percent(c.difference), unit, c.remark])
     marked = frozenset(k for k, c in enumerate(comparisons) if c.remark)
     head = ("quantity", "catalogue", "rig", "difference", "unit", "remark")
     note = "A blank cell means a plain number, or no remark."
-    return [Table("Catalogue and rig", head, rows, note, marked=marked)]
-
-
-def sheet_parts(
-    sheet: Record | None, measured: Sequence[tuple[str, str]], own: Sequence[tuple[str, str, str]] = ()
-) -> list[Table | Group | Prose]:
-    """Further measurements, and the data sheet with its sources and gaps; without a sheet the part's own data."""
-    parts: list[Table | Group | Prose] = [
-        Table("Further measurements", ("quantity", "value"), [list(row) for row in measured])
-    ]
-    data = [list(row) for row in (own if sheet is None else rows_of(sheet))]
-    if data:
-        parts.append(Table("The data sheet", ("quantity", "value", "source"), data))
-    if sheet is not None:
-        sources = [f"{s.status} ({', '.join(s.data)}): {s.text}" for s in sheet.sources]
-        parts += [Prose("Sources", sources)] if sources else []
-        gaps = [[gap.datum, gap.where] for gap in sheet.gaps]
-        parts += [Table("Missing data", ("datum", "source to look in"), gaps)] if gaps else []
-    return parts
+    return Table("Catalogue and rig", head, rows, note, marked=marked)
 
 
 def rig_parts(
@@ -221,12 +199,19 @@ def rig_parts(
     measured: Sequence[tuple[str, str]],
     how: Sequence[str],
     own: Sequence[tuple[str, str, str]] = (),
-) -> tuple[Table | Group | Prose, ...]:
-    """The tables below the charts: comparison, notes, further measurements, the data sheet, and the method."""
-    parts = comparison_table(comparisons)
-    if notes := list(notes):
-        parts.append(Prose("", notes, noted=True))
-    return (*parts, *sheet_parts(sheet, measured, own), Prose("Method", how))
+) -> tuple[Part, ...]:
+    """The parts below the charts: comparison, notes, further measurements, the data sheet or the part's own data, and the method."""
+    data = own if sheet is None else rows_of(sheet)
+    sources, gaps = ((), ()) if sheet is None else (sheet.sources, sheet.gaps)
+    return (
+        comparison_table(comparisons),
+        Prose("", list(notes), noted=True),
+        Table("Further measurements", ("quantity", "value"), measured),
+        Table("The data sheet", ("quantity", "value", "source"), data),
+        Prose("Sources", [f"{s.status} ({', '.join(s.data)}): {s.text}" for s in sources]),
+        Table("Missing data", ("datum", "source to look in"), [[gap.datum, gap.where] for gap in gaps]),
+        Prose("Method", how),
+    )
 
 
 def compared_rows(comparisons: Sequence[Comparison]) -> str:

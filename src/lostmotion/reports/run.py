@@ -19,6 +19,7 @@ from ..simulation.scenario.field_oriented_motors import errors_of
 from ..simulation.scenario.scenario import Scenario
 from ..units.practical import charted, counted, part_of_whole, printed
 from ..verdict import Point, Verdict
+from .panels import shown_energies
 from .run_loops import lines_of, loop_errors, points_of
 
 if TYPE_CHECKING:
@@ -89,11 +90,7 @@ def summary(result: xarray.Dataset | RunArrays) -> str:
     stuck, _ = _most([(share, text) for share, text in _stuck(result) if share > 0.0])
     lines += [f"  contacts stuck: {', '.join(stuck)} of the time"] if stuck else []
     if "energy" in result.attrs:
-        e = energy_of(result)
-        apart = ("residual", "turned_over")
-        found = [
-            (abs(v), f"{name.replace('_', ' ')} {v:.4g}") for name, v in e.items() if v != 0.0 and name not in apart
-        ]
+        found = [(abs(v), f"{name} {v:.4g}") for name, v in shown_energies(energy_of(result)).items()]
         parts, others = _most(found)
         parts += [f"{counted(len(others), 'other')} of up to {max(others):.4g} each"] if others else []
         lines.append(f"  energy [J]: {', '.join(parts) or 'none'}")
@@ -212,9 +209,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
     closes = f"; the energy balance closes to {closes_to(result)}" if e.get("turned_over") else ""
     last = float(result["time"][-1])
     first = f"{last:g} s with {counted(result.attrs['switching_count'], 'switching')}, by the {result.attrs['solver']} solver{closes}."
-    more = gear_charts(result)
     flows = [Flows("Energy of the whole run", e)] if e else []
-    gears = [Group("gears", "Torsion, losses and energy", "", (*more, *flows))] if more or flows else []
     found = verdict_of(result)
     shown = (first, *_motion_lines(result), *told)[:3]
     return Report(
@@ -223,7 +218,7 @@ def run_report(name: str, result: xarray.Dataset) -> Report:
         verdict=shown if found is None else Verdict(found.state, (*found.lines, *shown)[:3]),
         main=Group("run", "The run", "Drag over a chart to zoom, double-click to see all of it.", tuple(charts)),
         parts=(
-            *gears,
+            Group("gears", "Torsion, losses and energy", "", (*gear_charts(result), *flows)),
             _variables(result),
             Prose("Summary", [line for line in (*others, *told) if not line.endswith("at the end:")], listed=True),
         ),

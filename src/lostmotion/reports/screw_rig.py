@@ -13,8 +13,7 @@ from ..verdict import Verdict
 from .figure_style import DOTS, step
 from .page import Report
 from .panels import Curve, Group, Panel
-from .rig import agreement, compared_rows, rig_parts
-from .written_files import table_csv
+from .rig import agreement, compared_rows, loading_panels, rig_parts
 
 MEASURED = (
     "Deflection: the input is locked and the force on the slide goes through slow ramps. Efficiency: a flywheel keeps the screw at its speed against the force; it "
@@ -42,22 +41,14 @@ def panels(report: ScrewReport, sheet: ScrewSheet | None) -> list[Panel]:
         efficiency.append(Curve("catalogue", force[-1:], np.array([sheet.efficiency]), DOTS))
     if sheet is not None and sheet.drag_torque > 0.0:
         running.append(Curve("catalogue", np.array([RPM * RATED]), np.array([sheet.drag_torque]), DOTS))
-    found = [
+    titles, labels = (
+        ("deflection, input locked", "loops under alternating force"),
+        ("deflection [µm]", "axial force [N]"),
+    )
+    return [
+        *loading_panels(report.first_loading, report.loops, titles, labels, 1e6),
         Panel("efficiency over load", "axial force [N]", "efficiency [-]", tuple(efficiency), y_range=(0.0, 1.0)),
         Panel("drag torque", "speed of the screw [rpm]", "on the screw [N·m]", tuple(running), y_range=(0.0, top)),
-    ]
-    if report.first_loading is None:
-        return found
-    deflection, loading = report.first_loading
-    loops = [
-        Curve(f"±{loop.amplitude:.4g} N", 1e6 * loop.twist, loop.torque, step(k, 4))
-        for k, loop in enumerate(report.loops)
-    ]
-    first = Curve("rig, first loading", 1e6 * deflection, loading, step(0, 4))
-    return [
-        Panel("deflection, input locked", "deflection [µm]", "axial force [N]", (first,)),
-        Panel("loops under alternating force", "deflection [µm]", "axial force [N]", tuple(loops)),
-        *found,
     ]
 
 

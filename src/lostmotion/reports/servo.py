@@ -86,8 +86,8 @@ def _step_text(step: StepResponse) -> str:
 def _cycle_table(report: ServoReport, cycle: LimitCycle) -> Table:
     """The limit cycle, and its remainder without each possible cause."""
     motor, load = (charted(unit, small=True) for unit in (report.motor_unit, report.load_unit))
-    rows = []
-    for what, rest in {"nothing": cycle.whole, **cycle.without}.items():
+    rows, shown = [], {"nothing": cycle.whole, **cycle.without} if cycle.without else {}
+    for what, rest in shown.items():
         numbers = (motor[1] * rest.motor_amplitude, load[1] * rest.amplitude, rest.frequency)
         rows.append([what, *(map(_text, numbers) if rest.cycles else ("none", "none", ""))])
     header = ("left out", f"amplitude at the motor [{motor[0]}]", f"at the load [{load[0]}]", "frequency [Hz]")
@@ -214,27 +214,16 @@ def _motion_panels(report: ServoReport) -> Iterable[Panel]:
     yield Panel(f"following error over the run, {TRUE}", "time [s]", f"error [{unit}]", (error,))
 
 
-def _stiffness_group(report: ServoReport) -> list[Group]:
-    if not report.stiffness:
-        return []
-    slides = report.stiffness[0].slides
-    factor = 1e-6 if slides else 1.0
+def _stiffness_group(report: ServoReport) -> Group:
+    slides = bool(report.stiffness) and report.stiffness[0].slides
+    unit, factor = ("N/µm", 1e-6) if slides else ("N·m/rad", 1.0)
+    what = "force that moves its slide by one micrometre" if slides else "torque that turns its shaft by one radian"
     curves = tuple(Curve(s.regime, s.frequency, factor * s.stiffness, look(k)) for k, s in enumerate(report.stiffness))
-    title = f"stiffness at {report.stiffness[0].shaft}"
-    panel = Panel(
-        title, "frequency [Hz]", "stiffness [N/µm]" if slides else "stiffness [N·m/rad]", curves, log_x=True, log_y=True
+    panels = tuple(
+        Panel(f"stiffness at {s.shaft}", "frequency [Hz]", f"stiffness [{unit}]", curves, log_x=True, log_y=True)
+        for s in report.stiffness[:1]
     )
-    return [
-        Group(
-            "stiffness",
-            "Stiffness",
-            "The load force that moves its slide by one micrometre."
-            if slides
-            else "The load torque that turns its shaft by one radian.",
-            (panel,),
-            1,
-        )
-    ]
+    return Group("stiffness", "Stiffness", f"The load {what}.", panels, 1)
 
 
 def _loop_groups(report: ServoReport) -> tuple[Group, Group]:
@@ -282,11 +271,11 @@ def servo_report(name: str, report: ServoReport) -> Report:
             Table("Loops", HEADER, rows, blank, marked=wrong),
             Table("Regimes", ("regime", "what it is"), [list(pair) for pair in report.regimes.items()]),
             Table("Steps and motion", ("quantity", "value"), steps_and_motion),
-            *([_cycle_table(report, cycle)] if cycle is not None and cycle.without else []),
+            *([] if cycle is None else [_cycle_table(report, cycle)]),
             *([] if report.certificate is None else certificate_parts(report.certificate)),
             loops,
-            *([steps] if report.steps else []),
-            *_stiffness_group(report),
+            steps,
+            _stiffness_group(report),
             Prose("What is computed", COMPUTED),
         ),
         file="servo.html",

@@ -31,12 +31,9 @@ def open_loop_report(name: str, title: str, found: OpenLoop) -> Report:
     )
     lag = (Curve(found.motor, found.time, np.degrees(found.electrical_angle), look(0)),)
     _, *rows = found.summary()
-    parts: tuple[Table | Prose, ...] = (Table("Axis", ("quantity", "value"), rows), Prose("What is computed", COMPUTED))
-    if found.settling:
-        settled = [[str(k + 1), "not" if math.isinf(t) else f"{1e3 * t:.4g}"] for k, t in enumerate(found.settling)]
-        missed = frozenset(k for k, t in enumerate(found.settling) if math.isinf(t))
-        note = f"Time from the end of a move until the error stays within {practical(found.window, found.unit)}."
-        parts = (parts[0], Table("Settling", ("move", "after [ms]"), settled, note, marked=missed), parts[1])
+    settled = [[str(k + 1), "not" if math.isinf(t) else f"{1e3 * t:.4g}"] for k, t in enumerate(found.settling)]
+    missed = frozenset(k for k, t in enumerate(found.settling) if math.isinf(t))
+    note = f"Time from the end of a move until the error stays within {practical(found.window, found.unit)}."
     return Report(
         title=title or name,
         lead=f"Axis of the stepper {found.motor} of `{name}`, which is turned without a loop.",
@@ -51,6 +48,10 @@ def open_loop_report(name: str, title: str, found: OpenLoop) -> Report:
             ),
             1,
         ),
-        parts=parts,
+        parts=(
+            Table("Axis", ("quantity", "value"), rows),
+            Table("Settling", ("move", "after [ms]"), settled, note, marked=missed),
+            Prose("What is computed", COMPUTED),
+        ),
         file="servo.html",
     )

@@ -192,7 +192,7 @@ def _task_page(study: Study, table: pa.Table, name: str) -> Report:
     """Page of a task: its ranking alone, since the varied values are names."""
     shown = SelectionReport(table, study)
     lead = f"Selection of motor and gearbox for the task `{name}`: {_counted(table, study)}."
-    return Report(study.title or name, lead, shown.verdict, shown.chart, tuple(shown.parts()), FILE, shown.files())
+    return Report(study.title or name, lead, shown.verdict, shown.chart, shown.parts(), FILE, shown.files())
 
 
 FILE = "study.html"
@@ -219,13 +219,11 @@ def _whole_indices(table: pa.Table, study: Study) -> dict[str, dict[str, tuple[f
 
 
 def _study_page(study: Study, table: pa.Table, name: str) -> Report:
-    failures = _failures(table)
     rows = statistics(table, study, page=True)
     shown = [[row[0], *("" if np.isnan(x) else f"{x:.5g}" for x in row[1:])] for row in rows]
     parts: list[Any] = [Table("Statistics", ("value", *STATISTICS), shown, BLANK)]
     ranks = influence(table, study) if _with_order(study) else {}
-    if ranks:
-        parts.append(bars("tornado", "Influence of the parameters", ranks, "rank correlation [-]"))
+    parts.append(bars("tornado", "Influence of the parameters", ranks, "rank correlation [-]"))
     if indices := _whole_indices(table, study):
         shares = {kept: {p: found[:2] for p, found in by.items()} for kept, by in indices.items()}
         parts.append(bars("sobol", "Sobol indices", shares, "Sobol index [-]", ("first order", "total")))
@@ -241,11 +239,9 @@ def _study_page(study: Study, table: pa.Table, name: str) -> Report:
         selected = SelectionReport(table, study)
         tables, verdict = tables | selected.files(), selected.verdict
         main, parts = selected.chart, [*selected.parts(), main, *parts]
-    if failures:
-        parts.append(Prose("Runs that failed", failures, listed=True))
+    parts.append(Prose("Runs that failed", _failures(table), listed=True))
     lead = f"Study `{name}`: {_counted(table, study)}."
-    kept = [part for part in parts if not isinstance(part, Group) or part.charts]
-    return Report(study.title or name, lead, verdict, main, tuple(kept), FILE, tables)
+    return Report(study.title or name, lead, verdict, main, parts, FILE, tables)
 
 
 def _result(

@@ -213,7 +213,7 @@ class SelectionReport:
         for title, groups in self.lacking.items():
             rows = [[str(len(g.candidates)), g.candidates[0], g.datum] for g in groups[:MAX_ROWS]]
             tables.append(Table(title, ("candidates", "such as", "why"), rows))
-        return [table for table in tables if table.rows]
+        return tables
 
     def _ranking_table(self) -> Table:
         fitting = self.fitting[:MAX_ROWS]

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..units.practical import part_of_whole
-from .contours import ticks
+from .contours import edges, ticks
 from .packed import colour_name, dashes
 from .panels import Bars, Chart, Contacts, Curve, Drawing, Ground, Histogram, Panel
 from .thinning import simplified, thinned
@@ -172,7 +172,7 @@ def _beside(x: float, y: float, text: str) -> str:
 
 def _ground(ground: Ground, to_x: Scale, to_y: Scale) -> str:
     """A map as cells in a few shades."""
-    across, along = (_edges(to(np.asarray(v, float))) for to, v in ((to_x, ground.x), (to_y, ground.y)))
+    across, along = (edges(to(np.asarray(v, float))).tolist() for to, v in ((to_x, ground.x), (to_y, ground.y)))
     values = np.asarray(ground.values, float)
     low, high = extent([values], False, 0.0)
     with np.errstate(invalid="ignore"):
@@ -199,12 +199,6 @@ def _contours(panel: Panel, to_x: Scale, to_y: Scale) -> str:
             texts.append(f'<text class="tick contour" x="{x:.1f}" y="{y + 4:.1f}">{contour.text}</text>')
             written.append((x, y))
     return f'<path class="contour" d="{"".join(lines)}"/>{"".join(texts)}'
-
-
-def _edges(middles: np.ndarray) -> list[float]:
-    """Limits of cells about their middles, the outermost at the ends."""
-    between = 0.5 * (middles[1:] + middles[:-1])
-    return [float(v) for v in (middles[0], *between, middles[-1])]
 
 
 def _svg(title: str, height: float, parts: Iterable[str], width: float = WIDTH) -> str:
