@@ -12,7 +12,7 @@ import numpy as np
 from ..errors import prefixed
 from ..inputs.argument_checks import checked
 from ..inputs.quantities import Count
-from .candidate_models import RungResult, begun_with, chosen, climb, first_fit, is_rough
+from .candidate_models import Notify, RungResult, begun_with, chosen, climb, first_fit, is_rough
 from .fit.input_courses import Way, as_recorded, nearer_ways
 from .fit.intervals import Interval, bootstrap, profile, widest
 from .fit.least_squares import Fit, FitProblem, linearised, problem_of, search
@@ -33,7 +33,6 @@ from .verdicts.identifiability import Undetermined, at_bounds, resting_on
 from .verdicts.residual_tests import Misfit, explained, hidden, misfits, with_shapes
 from .verdicts.shared_faults import SharedFault, family, kinds, shared_faults
 
-Notify = Callable[[str, int, float], None]
 MANY = 10  # fitted logs for one that is left out: as many keep the models near to what they were
 
 

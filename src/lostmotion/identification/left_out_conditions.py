@@ -1,20 +1,18 @@
 """Errors of logs under a condition that the fit has not seen: the model is fitted again without them, one condition after the other."""
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 from ..errors import InputError
 from ..inputs.refusal_messages import shortened
 from ..units.practical import counted
-from .candidate_models import mean_errors, with_own
+from .candidate_models import Notify, mean_errors, with_own
 from .fit.least_squares import Fit, problem_of, search
 from .fit.log_errors import log_errors
 from .prepared_log import Prepared
 from .rig.residuals import Engine
-
-Notify = Callable[[str, int, float], None]
 
 
 @dataclass(frozen=True)

@@ -105,7 +105,7 @@ def _solved(
 ) -> tuple[dict[str, float], dict[str, str]]:
     """(values found, why others are not) with one filter. Raises InputError: there is no regression."""
     balance = _Balance(rig, logs, point, shown, width)
-    delays = frozenset().union(*(names_in(i.delay) for i in rig.task.inputs.values()))
+    delays = names_in([i.delay for i in rig.task.inputs.values()])
     kept: dict[str, str] = {}
     steps: dict[str, float] = {}
     columns: dict[str, np.ndarray] = {}

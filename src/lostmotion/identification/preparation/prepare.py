@@ -14,7 +14,7 @@ from ...units.practical import counted
 from ..prepared_log import Prepared, Segment, fact_names, facts_of
 from ..readers.channel_units import channel_unit
 from ..readers.log import Channel, Log
-from ..task.file_formulas import Formula, names_within
+from ..task.file_formulas import Formula, names_in
 from ..task.identification_file import FormulaText, Identification, InputChannel, MeasuredChannel
 from .screening import screened
 
@@ -154,7 +154,7 @@ def first_values_named(task: Identification) -> set[str]:
 
 def _named(task: Identification) -> frozenset[str]:
     """Names in the formulas of a task."""
-    return names_within(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs", "monitor"}))
+    return names_in(task.model_dump(include={"set", "phases", "ladder", "logs", "measured", "inputs", "monitor"}))
 
 
 def _fact(text: Any, facts: Mapping[str, Any], log: Log, key: str) -> Any:

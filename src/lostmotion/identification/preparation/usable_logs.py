@@ -11,8 +11,8 @@ from ..prepared_log import Prepared
 from ..readers.log_files import find_logs, read_log
 from ..rig.measurement_model import numbers_of
 from ..rig.residuals import start_point
-from ..rig.rig_scenario import Rig, names_of
-from ..task.file_formulas import Formula
+from ..rig.rig_scenario import Rig
+from ..task.file_formulas import Formula, names_in
 from ..task.identification_file import Identification
 from .prepare import prepared
 
@@ -101,7 +101,7 @@ def _unlike(rig: Rig, log: Prepared, known: frozenset[str]) -> str:
 def _lacking(formulas: Mapping[str, Any], values: Mapping[str, Any], known: frozenset[str]) -> str:
     """Header entries that a log lacks and others have."""
     for key, formula in formulas.items():
-        for name in sorted(names_of(formula)):
+        for name in sorted(names_in(formula)):
             if name not in values and name in known:
                 return f"has no {name}, which key set.{key} names; add it to the file, or give it with logs.header"
     return ""

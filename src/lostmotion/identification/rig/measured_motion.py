@@ -69,7 +69,7 @@ def measured_course(rig: Rig, log: Prepared, channel: str, known: Mapping[str, A
 def names_of_channel(rig: Rig, channel: str) -> frozenset[str]:
     """Names in the scale, the offset and the delay of a measured channel."""
     m = rig.task.measured[channel]
-    return names_in(m.scale) | names_in(m.offset) | names_in(m.delay)
+    return names_in([m.scale, m.offset, m.delay])
 
 
 def windows(rig: Rig, logs: Sequence[Prepared], point: ParameterPoint, rung: int, length: float) -> list[Prepared]:

@@ -53,10 +53,7 @@ def rates_of(points: np.ndarray) -> np.ndarray:
     At a point of the speed it is the mean of the slopes on both sides. That of one side would be half a sample early, and the inertia
     would look like friction.
 
-    Parameters
-    ----------
-    points : array (points, 3)
-        Time, speed and slope.
+    points: array (points, 3) of time, speed and slope.
 
     Returns array (points, 3): time, acceleration and its slope.
     """

@@ -132,7 +132,7 @@ def numbers_of(m: MeasuredChannel, known: Mapping[str, Any]) -> dict[str, float]
 
 def delays_that_name(task: Identification, names: Sequence[str]) -> bool:
     """Whether the delay of a channel depends on one of the parameters."""
-    return any(names_in(m.delay) & set(names) for m in task.measured.values())
+    return bool(names_in([m.delay for m in task.measured.values()]) & set(names))
 
 
 def _grid(log: Prepared, interval: float | None) -> np.ndarray:

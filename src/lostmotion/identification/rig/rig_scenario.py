@@ -141,10 +141,9 @@ class Rig:
     def _refuse_idle(self) -> None:
         """A parameter that is sought and enters nothing."""
         task = self.task
-        entered = names_of([self._set, *self._phases, *self._rungs])
+        entered = names_in([self._set, *self._phases, *self._rungs])
         for channel in (*task.inputs.values(), *task.measured.values()):
-            numbers = (getattr(channel, key, None) for key in CHANNEL_FORMULAS)
-            entered |= frozenset().union(*(names_in(n) for n in numbers if n is not None))
+            entered |= names_in([getattr(channel, key, None) for key in CHANNEL_FORMULAS])
         sought = [("parameters", name) for rung in task.rungs() for name in rung.free]
         for table, name in [*sought, *(("nuisance", name) for name in task.nuisance)]:
             if name not in entered:
@@ -172,7 +171,7 @@ class Rig:
         """Keys of the scenario that depend on a parameter."""
         where = (name, rung, phase)
         if where not in self._keys:
-            self._keys[where] = [key for key, f in self.formulas(rung, phase).items() if name in names_of(f)]
+            self._keys[where] = [key for key, f in self.formulas(rung, phase).items() if name in names_in(f)]
         return self._keys[where]
 
     def leaves_of(self, name: str, rung: int, phase: int) -> list[str]:
@@ -295,19 +294,11 @@ def units_of(scenario: Scenario) -> dict[str, str]:
     return units
 
 
-def names_of(node: Any) -> frozenset[str]:
-    """Names in formulas, also within lists and tables."""
-    if isinstance(node, Formula):
-        return node.names
-    inner = node.values() if isinstance(node, dict) else node if isinstance(node, list) else ()
-    return frozenset().union(*map(names_of, inner))
-
-
 def _leaves(node: Any, key: str, name: str) -> list[str]:
     """Keys within a value whose formulas name something."""
     if isinstance(node, dict):
         return [leaf for k, inner in node.items() for leaf in _leaves(inner, f"{key}.{k}", name)]
-    return [key] if name in names_of(node) else []
+    return [key] if name in names_in(node) else []
 
 
 def _read(value: Any, key: str) -> Any:

@@ -105,21 +105,17 @@ def formula(text: str) -> Formula:
     return Formula(text)
 
 
-def names_in(text: str | float) -> frozenset[str]:
-    """Names in a formula."""
-    return formula(text).names if isinstance(text, str) else frozenset()
-
-
-def names_within(value: object) -> frozenset[str]:
-    """Names in the formulas of a value, a list or a table; texts that are not formulas have none."""
-    if isinstance(value, list | tuple):
-        return frozenset().union(*map(names_within, value))
-    if isinstance(value, dict):
-        return frozenset().union(*map(names_within, value.values()))
-    try:
-        return formula(value).names if isinstance(value, str) else frozenset()
-    except ValueError:
-        return frozenset()
+def names_in(value: object) -> frozenset[str]:
+    """Names in a formula, or in the formulas of a list or a table; numbers and texts that are not formulas have none."""
+    if isinstance(value, str):
+        try:
+            return formula(value).names
+        except ValueError:
+            return frozenset()
+    if isinstance(value, Formula):
+        return value.names
+    inner = value.values() if isinstance(value, dict) else value if isinstance(value, list | tuple) else ()
+    return frozenset().union(*map(names_in, inner))
 
 
 def number(text: str | float, known: Mapping[str, Any], key: str) -> float:

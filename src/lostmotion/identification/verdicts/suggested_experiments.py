@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 from ..rig.rig_scenario import Rig
-from ..task.file_formulas import names_within
+from ..task.file_formulas import names_in
 from ..task.identification_file import CHANNEL_FORMULAS, Identification
 
 OTHERWISE = "give a value with a tolerance as a prior, or a log in which they act apart"
@@ -55,7 +55,7 @@ def torque_known(rig: Rig) -> bool:
 def keys_of(task: Identification, name: str) -> list[str]:
     """Keys of the scenario, and of channels, that a parameter enters."""
     tables = [task.set, *(rung.set for rung in task.ladder), *(phase.set for phase in task.phases)]
-    found = [key for table in tables for key, value in table.items() if name in names_within(value)]
+    found = [key for table in tables for key, value in table.items() if name in names_in(value)]
     for entry in (*task.inputs.values(), *task.measured.values()):
-        found += [key for key in CHANNEL_FORMULAS if name in names_within(getattr(entry, key, None))]
+        found += [key for key in CHANNEL_FORMULAS if name in names_in(getattr(entry, key, None))]
     return found
