@@ -105,29 +105,21 @@ def study(
     files = parts(directory, what)
     missing = [runs for runs, part in files.items() if not part.exists()]
     done = what.total - sum(last - first for first, last in missing)
-    report = _rising(progress or _silent)
+    furthest = 0
+
+    def report(done: int) -> None:
+        """Notify of the furthest alone: a chunk is simulated while the one before it is being written."""
+        nonlocal furthest
+        furthest = max(furthest, done)
+        if progress is not None:
+            progress(furthest)
+
     report(done)
     for first, last, content in _compute(text, missing, threads or os.cpu_count() or 1, executor, report, done):
         write_part(files[first, last], content)
         done += last - first
         report(done)
     return directory
-
-
-def _silent(done: int) -> None:
-    """No progress wanted."""
-
-
-def _rising(progress: Callable[[int], None]) -> Callable[[int], None]:
-    """The same, notified of the furthest only: a chunk is simulated while the one before it is being written."""
-    furthest = 0
-
-    def report(done: int) -> None:
-        nonlocal furthest
-        furthest = max(furthest, done)
-        progress(furthest)
-
-    return report
 
 
 def damages_of(directory: Path, what: Study) -> dict[Path, str]:
@@ -220,7 +212,13 @@ def _compute_here(
 ) -> Iterator[tuple[int, int, bytes]]:
     """While a piece is simulated, the one before it is made into a table beside it."""
     study = parsed(text)
-    before: tuple[int, int, Future[bytes]] | None = None
+    written: list[tuple[int, int, Future[bytes]]] = []  # the chunk before, if it is not yet given
+
+    def given() -> Iterator[tuple[int, int, bytes]]:
+        while written:
+            first, last, content = written.pop()
+            yield first, last, content.result()
+
     with ThreadPoolExecutor(max_workers=1) as beside:
         for first, last in missing:
             tables: list[Future[Any]] = []
@@ -234,14 +232,11 @@ def _compute_here(
                     if b < last:
                         report(done)
             except BaseException:  # interrupted; what is simulated is not lost
-                if before is not None:
-                    yield before[0], before[1], before[2].result()
+                yield from given()
                 raise
-            if before is not None:
-                yield before[0], before[1], before[2].result()
-            before = first, last, beside.submit(_together, text, tables)
-        if before is not None:
-            yield before[0], before[1], before[2].result()
+            yield from given()
+            written.append((first, last, beside.submit(_together, text, tables)))
+        yield from given()
 
 
 def _together(text: str, tables: list[Future[Any]]) -> bytes:

@@ -228,14 +228,11 @@ def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
     from ...data_sheets.motor_sheet import TORQUE_SOURCE, MotorSheet
 
     whole = [entry for entry in vary if isinstance(entry, dict) and entry.get("key") in WHOLE]
-    if any(
-        find(name, entry["key"]).level() in (FORCE_SOURCE, TORQUE_SOURCE) for entry in whole for name in _names(entry)
-    ):
+    of_force = (FORCE_SOURCE, TORQUE_SOURCE)
+    if any(find(name, entry["key"]).level() in of_force for entry in whole for name in _names(entry)):
         return True
-    records = [entry for entry in vary if isinstance(entry, dict) and kind_of_record(str(entry.get("key"))) == "motor"]
-    names = [name for entry in records for name in _names(entry)]
-    if not records:
-        given = written["motor"]
+    names, given = _motors(vary), written["motor"]
+    if names is None:
         if "from" not in given:
             phases = given.get("resistance_phase") is not None and given.get("rated_current") is not None
             return given.get("kind") == "torque_source" or (given.get("kind") == "stepper" and not phases)
@@ -246,10 +243,13 @@ def _torque_sources(written: dict[str, Any], vary: list[Any]) -> bool:
 
 def _any_stepper(written: dict[str, Any], vary: list[Any]) -> bool:
     """Whether a candidate of the motor is a stepper."""
+    return is_stepper(written["motor"]) or any(is_stepper({"from": name}) for name in _motors(vary) or ())
+
+
+def _motors(vary: list[Any]) -> list[str] | None:
+    """The names of records of motors among the candidates; None where no motor varies by its record."""
     records = [entry for entry in vary if isinstance(entry, dict) and kind_of_record(str(entry.get("key"))) == "motor"]
-    return is_stepper(written["motor"]) or any(
-        is_stepper({"from": name}) for entry in records for name in _names(entry)
-    )
+    return [name for entry in records for name in _names(entry)] if records else None
 
 
 def _names(entry: dict[str, Any]) -> list[str]:

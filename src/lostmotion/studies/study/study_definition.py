@@ -122,10 +122,7 @@ class Study(Part):
     def at(self, row: np.ndarray) -> tuple["Study", np.ndarray]:
         """The study with the values of a row at keys that are none of motor or gearbox, and the row without these.
 
-        Raises
-        ------
-        InputError
-            There is no such task.
+        Raises InputError: there is no such task.
         """
         own = [k for k, v in enumerate(self.vary) if v.unit_of_values is not None]
         if not own:
@@ -267,20 +264,14 @@ class Study(Part):
     def scenario_at(self, row: np.ndarray) -> Scenario:
         """The scenario of one run, by its row of `parameters`; of a task under gains by rule.
 
-        Raises
-        ------
-        InputError
-            There is no such scenario.
+        Raises InputError: there is no such scenario.
         """
         return self.scenario_with(dict(enumerate(row))) if self.axis is None else self.axis_at(row, FEWEST)
 
     def axis_at(self, row: np.ndarray, cycles: int) -> Scenario:
         """The scenario of one pair of a task over so many cycles.
 
-        Raises
-        ------
-        InputError
-            There is no such scenario.
+        Raises InputError: there is no such scenario.
         """
         one, row = self.at(row)
         if one is not self:
@@ -324,10 +315,7 @@ class Study(Part):
     def part(self, kind: str, row: np.ndarray) -> Any:
         """The ``"gearbox"``, the ``"motor"`` or the ``"stage"`` of a row of a task, made once.
 
-        Raises
-        ------
-        InputError
-            There is none.
+        Raises InputError: there is none.
         """
         linear = None if self.axis is None else self.axis.linear
         key = self.part_key(linear.kind if kind == "stage" and linear is not None and linear.kind else kind, row)
@@ -364,10 +352,7 @@ class Study(Part):
     def brake(self, row: np.ndarray) -> HoldingBrake | None:
         """The holding brake of a row of a task.
 
-        Raises
-        ------
-        InputError
-            The task wants the brake of the motor, and the catalogue has none.
+        Raises InputError: the task wants the brake of the motor, and the catalogue has none.
         """
         brake = self._task.brake
         if brake is None or not brake.of_the_motor:
@@ -394,10 +379,7 @@ class Study(Part):
     def records(self, row: np.ndarray) -> dict[str, Sheet]:
         """Data sheets of the parts of a row of a task that are records, by their kinds.
 
-        Raises
-        ------
-        InputError
-            A file of them cannot be read.
+        Raises InputError: a file of them cannot be read.
         """
         linear, found = self._task.linear, dict[str, Sheet]()
         motor = self._task.steppers or self.tables.get("motor", {})
@@ -417,10 +399,7 @@ class Study(Part):
     def scenario_with(self, numbers: Mapping[int, float]) -> Scenario:
         """The base with some of the parameters, by their places in `vary`.
 
-        Raises
-        ------
-        InputError
-            There is no such scenario.
+        Raises InputError: there is no such scenario.
         """
         varied = [(self.vary[k], number) for k, number in numbers.items()]
         values = {key: (v, v.value(number)) for v, number in varied for key in v.all_keys}
