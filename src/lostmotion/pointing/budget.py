@@ -40,8 +40,7 @@ class PointingError:
     rms: float
     peak: float
     mean: float
-    probable: float
-    """0.6745 standard deviations"""
+    probable: float  #: 0.6745 standard deviations
     measured_rms: float
     """rms of the measured direction: with a camera, target minus expected target of its tracker; else the angle of
     the load minus the angle of the encoder, or of a stepper minus the angle that its driver counts"""
@@ -51,10 +50,8 @@ class PointingError:
 class View:
     """Share of the time in which the target is within the field of view."""
 
-    share: float
-    """share of the time"""
-    probability: float
-    """product over the axes of normal distributions of these means and deviations"""
+    share: float  #: share of the time
+    probability: float  #: product over the axes of normal distributions of these means and deviations
 
 
 Errors = Mapping[str, PointingError]  # by the motor of the axis
@@ -65,44 +62,30 @@ class PointingBudget:
     """Pointing errors of axes with their causes."""
 
     scenario: Scenario
-    after: float
-    """[s], what is before does not count"""
-    after_line: str
-    """why errors count from then on"""
-    time: np.ndarray
-    """[s]"""
+    after: float  #: [s], what is before does not count
+    after_line: str  #: why errors count from then on
+    time: np.ndarray  #: [s]
     errors: Mapping[str, np.ndarray]
     """reference less angle of the load [rad], or position of the slide [m], over time, by the motor of the axis"""
-    measured: Mapping[str, np.ndarray]
-    """error of the measured direction [rad, m] over time, as in `PointingError`"""
-    whole: Errors
-    """errors of the scenario as it is"""
-    without: Mapping[str, Errors]
-    """with one cause taken away, by its name"""
-    alone: Mapping[str, Errors]
-    """with that cause alone"""
+    measured: Mapping[str, np.ndarray]  #: error of the measured direction [rad, m] over time, as in `PointingError`
+    whole: Errors  #: errors of the scenario as it is
+    without: Mapping[str, Errors]  #: with one cause taken away, by its name
+    alone: Mapping[str, Errors]  #: with that cause alone
     successive: Mapping[str, Errors]
     """with that cause and all before it taken away; the decreases of the mean square from line to line add up"""
-    ideal: Errors
-    """with none of them: what the controller itself leaves"""
-    variants: Mapping[str, Errors]
-    """with another controller"""
+    ideal: Errors  #: with none of them: what the controller itself leaves
+    variants: Mapping[str, Errors]  #: with another controller
     robustness: Mapping[str, Errors]
     """at other temperatures, with wear, with losses in the controller that are wrong by a factor"""
     speeds: Mapping[float, Errors]
     """by the factor on the speed of the targets, 1 included; empty where the references are no targets with a speed"""
-    pixels: Mapping[str, float]
-    """angle of a pixel [rad] of the axes with a camera"""
-    units: Mapping[str, str]
-    """unit of each axis: rad, or m of a slide"""
-    lost: tuple[LostSteps, ...]
-    """steps that the steppers lose"""
+    pixels: Mapping[str, float]  #: angle of a pixel [rad] of the axes with a camera
+    units: Mapping[str, str]  #: unit of each axis: rad, or m of a slide
+    lost: tuple[LostSteps, ...]  #: steps that the steppers lose
     orders: Mapping[str, Spectrum | str]
     """error of each stepper's axis at constant speed by orders, or why there is none"""
-    view: View | None = None
-    """view, if a field of view is given or cameras have one"""
-    limits: Mapping[str, float] = field(default_factory=dict)
-    """largest permitted error [rad, m] of axes that have one"""
+    view: View | None = None  #: view, if a field of view is given or cameras have one
+    limits: Mapping[str, float] = field(default_factory=dict)  #: largest permitted error [rad, m] of axes that have one
 
     def contributions(self, axis: str) -> dict[str, float]:
         """Fall of the mean square error of an axis [rad², m²] with each cause, as all are taken away one after another.

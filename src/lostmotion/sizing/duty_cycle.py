@@ -43,8 +43,7 @@ def stretches(values: np.ndarray, inside: np.ndarray) -> list[float]:
     return [total for total in each if total > 0.0]
 
 
-Rest = tuple[float, float, slice]
-"""rest after a move: direction and end [s] of the move, and the samples of the rest"""
+Rest = tuple[float, float, slice]  # rest after a move: direction and end [s] of the move, and the samples of the rest
 
 
 def rests_of(reference: AnyMoves, time: np.ndarray, count: int | None = None) -> list[Rest]:

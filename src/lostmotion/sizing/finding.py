@@ -77,14 +77,12 @@ LISTED = 3  # points that are not judged, in a verdict
 class Finding:
     """One point of the check."""
 
-    rule: str
-    """key of `SOURCES`"""
+    rule: str  #: key of `SOURCES`
     what: str
     value: str
     verdict: Judgement
     remark: str = ""
-    use: float | None = None
-    """share of the limit that is used; above 1 it is exceeded"""
+    use: float | None = None  #: share of the limit that is used; above 1 it is exceeded
 
     @property
     def source(self) -> str:

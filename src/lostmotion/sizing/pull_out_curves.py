@@ -28,20 +28,15 @@ if TYPE_CHECKING:
     import xarray
 
 RATES = 10.0, 1e6  # [Hz], of full steps
-HALVINGS = 8
-"""of the holding torque: a run decides each"""
+HALVINGS = 8  # of the holding torque: a run decides each
 SPEEDING, RAMP, HOLD = 60.0, 30.0, 15.0
 """periods of the rotor in its field over which the field speeds up, the load of the pull-out torque rises, and then stays"""
 STARTED, SWUNG = 20.0, 60.0
 """periods after which a rotor has started or not, and in which it swings"""
-STEPS = 40.0
-"""full steps of a run at least"""
-STAIRS = 100
-"""speeds over which the field speeds up"""
-POINTS = 40
-"""samples of a period"""
-ABOVE = 1.05
-"""of the holding torque, which no stepper holds"""
+STEPS = 40.0  # full steps of a run at least
+STAIRS = 100  # speeds over which the field speeds up
+POINTS = 40  # samples of a period
+ABOVE = 1.05  # of the holding torque, which no stepper holds
 
 
 @checked

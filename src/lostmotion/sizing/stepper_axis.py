@@ -33,28 +33,21 @@ class OpenLoop:
 
     motor: str
     shaft: str
-    unit: str
-    """rad, or m of a slide"""
+    unit: str  #: rad, or m of a slide
     field_stiffness: float
     """stiffness of the field at the shaft, ``n T_H`` over the square of the ratio [N·m/rad, N/m]"""
-    stiffness: float | None
-    """the same in series with what is soft behind the motor; None where the train is no chain"""
-    resonances: tuple[float, ...]
-    """[Hz] of the rotor in its field and the load; empty where the train is no chain"""
-    following: float
-    """largest distance from the reference"""
+    stiffness: float | None  #: the same in series with what is soft behind the motor; None where the train is no chain
+    resonances: tuple[float, ...]  #: [Hz] of the rotor in its field and the load; empty where the train is no chain
+    following: float  #: largest distance from the reference
     window: float
     settling: tuple[float, ...]
     """of each move: time from its end until the shaft stays within the window [s]; infinite where it does not"""
     reversal: float | None
     """at rest after moves forward less after moves backward, magnitude; None where moves go one way"""
     lost: LostSteps
-    time: np.ndarray = field(repr=False, compare=False)
-    """instants of the run [s]"""
-    error: np.ndarray = field(repr=False, compare=False)
-    """reference less shaft, over them"""
-    electrical_angle: np.ndarray = field(repr=False, compare=False)
-    """of the field before the rotor, over them [rad]"""
+    time: np.ndarray = field(repr=False, compare=False)  #: instants of the run [s]
+    error: np.ndarray = field(repr=False, compare=False)  #: reference less shaft, over them
+    electrical_angle: np.ndarray = field(repr=False, compare=False)  #: of the field before the rotor, over them [rad]
 
     @property
     def verdict(self) -> Verdict:

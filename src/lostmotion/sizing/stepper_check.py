@@ -13,14 +13,10 @@ from ..units.practical import RPM
 from .finding import Finding, Judgement
 from .motor_check import largest_speed
 
-SAFETY = 1.5
-"""of the pull-out torque over the torque of a run, the smaller end of the range that manufacturers give"""
-NEAR = 1.5
-"""ratio of two frequencies that are near each other"""
-DWELL = 0.02
-"""share of a run in which a step rate near the resonance counts"""
-COARSE = 2
-"""microsteps from which on a step excites little"""
+SAFETY = 1.5  # of the pull-out torque over the torque of a run, the smaller end of the range that manufacturers give
+NEAR = 1.5  # ratio of two frequencies that are near each other
+DWELL = 0.02  # share of a run in which a step rate near the resonance counts
+COARSE = 2  # microsteps from which on a step excites little
 
 
 def stepper_rules(scenario: Scenario, name: str, result: RunArrays) -> list[Finding]:
@@ -60,12 +56,8 @@ def microsteps_of(scenario: Scenario, name: str) -> int:
 def torque_reserve(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: str = "motor") -> Finding:
     """Largest share of the pull-out torque at the speed at which it is needed.
 
-    Parameters
-    ----------
-    torque, speed
-        Of the motor over a motion, without sign [N·m, rad/s].
-    where
-        Table of the motor, for what is missing.
+    torque, speed: magnitudes of the motor's torque and speed over a motion [N·m, rad/s].
+    where: table of the motor, for missing keys.
     """
     missing = [f"{where}.{key}" for key in ELECTRIC if getattr(motor, key) is None]
     assert motor.holding_torque is not None
@@ -93,14 +85,9 @@ def torque_reserve(motor: Motor, torque: np.ndarray, speed: np.ndarray, where: s
 def step_resonance(motor: Motor, inertia: float, speed: np.ndarray, microsteps: int) -> Finding:
     """Whether a motion keeps full steps at the frequency at which the rotor swings in its field.
 
-    Parameters
-    ----------
-    inertia
-        That is fixed to the rotor [kg·m²].
-    speed
-        Of the rotor at even instants, without sign [rad/s].
-    microsteps
-        Of the driver, to a full step.
+    inertia: inertia that is fixed to the rotor [kg·m²].
+    speed: magnitude of the rotor's speed at even instants [rad/s].
+    microsteps: microsteps of the driver to a full step.
     """
     assert motor.steps_per_revolution is not None
     assert motor.holding_torque is not None
