@@ -9,7 +9,7 @@ from lostmotion.data_sheets.records import find
 from lostmotion.paper import AMPLITUDES, MODELS, paper_scenario
 from lostmotion.paper.runs import stuck_intervals
 from lostmotion.reports import plots
-from lostmotion.reports.looks import STYLES
+from lostmotion.reports.figure_style import STYLES
 from lostmotion.reports.panels import Curve, Panel
 from lostmotion.reports.rig import panels
 from lostmotion.reports.study_selection import pareto_figure

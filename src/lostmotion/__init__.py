@@ -32,7 +32,7 @@ _WITH_PAGES = (
     "identification.identify",
     "identification.monitor.monitor",
     "pointing.budget",
-    "servo.commission",
+    "servo.commissioning_report",
     "sizing.drive_check",
     "test_rig.measurement",
 )

@@ -9,7 +9,7 @@ PAGES = {
     "identification.identify": ("IdentificationResult", "identification", "identification_report"),
     "identification.monitor.monitor": ("MonitorResult", "monitor", "monitor_report"),
     "pointing.budget": ("PointingBudget", "pointing", "pointing_report"),
-    "servo.commission": ("ServoReport", "servo", "servo_report"),
+    "servo.commissioning_report": ("ServoReport", "servo", "servo_report"),
     "sizing.drive_check": ("Findings", "drive_check", "check_report"),
     "test_rig.measurement": ("RigReport", "rig", "rig_report"),
 }

@@ -12,7 +12,7 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.ticker import MaxNLocator
 
-from . import other_plots as others
+from . import bar_and_matrix_plots as others
 from .contours import Contour, edges
 from .figure_style import COLOURS, INK, MATPLOTLIB, MUTED, SMALLEST, map_colours
 from .panels import Chart, Curve, Ground, Group, Mark, Matrix, Panel

@@ -14,9 +14,9 @@ from ..test_rig.torsion_loop import Loop
 from ..test_rig.virtual_rig import LOST_MOTION_LOAD
 from ..units.practical import ARCMIN, RPM, counted, practical
 from ..verdict import Point, Verdict
+from .data_sheet_rows import rows_of, rows_of_part
 from .figure_style import DOTS, step
 from .page import Part, Prose, Report, Table
-from .written_files import table_csv
 from .panels import Curve, Group, Panel
 from .written_files import table_csv
 

@@ -14,6 +14,7 @@ from .figure_style import DOTS, step
 from .page import Report
 from .panels import Curve, Group, Panel
 from .rig import agreement, compared_rows, loading_panels, rig_parts
+from .written_files import table_csv
 
 MEASURED = (
     "Deflection: the input is locked and the force on the slide goes through slow ramps. Efficiency: a flywheel keeps the screw at its speed against the force; it "
