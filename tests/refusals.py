@@ -46,6 +46,12 @@ def refuses(*keys: str, match: str = "") -> Iterator[list[str]]:
     assert re.search(match, told[0]), f"{told[0]} lacks {match}"
 
 
+def file_of(path: Path, text: str) -> Path:
+    """A file with this text."""
+    path.write_text(text)
+    return path
+
+
 def refusals_of(make: Callable[..., object], *cases: tuple[Any, ...]) -> Callable[..., None]:
     """A test that `make` refuses the arguments of each case, whose last entry says by which data, as `keys: reason`.
 

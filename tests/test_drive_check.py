@@ -22,7 +22,7 @@ from lostmotion.sizing.drive_check import check_drive
 from lostmotion.sizing.duty_cycle import DutyCycle, duty_cycle
 from lostmotion.sizing.finding import RULES, Finding
 from lostmotion.sizing.holding import holding
-from refusals import refused
+from refusals import refusals_of, refused
 from tables import rated_gearbox, run_of, torque_source
 
 RPM = math.pi / 30.0
@@ -657,12 +657,10 @@ def test_a_brake_and_a_payload_of_an_axis_are_those_of_the_long_form():
     assert not held["motor_speed"].any()
 
 
-@pytest.mark.parametrize(("axis", "key"), [
+test_what_is_wrong_with_them_is_said_with_the_key_of_the_file = refusals_of(
+    lambda axis: lm.Scenario(axis={"motor": ROTOR, "slide": {"mass": 1.0}, "screw": {"lead": 0.02}} | axis, simulation=run_of(1, 0.1)),
     ({"brake": {"torque": 1.0}}, "axis.brake.command"),
     ({"brake": {"torque": -1.0, "command": 0.0}}, "axis.brake.torque"),
     ({"payload": {"mass": "2 m"}}, "axis.payload.mass"),
     ({"payload": {"inertia": 2.0}}, "axis.payload.inertia"),
-])  # fmt: skip
-def test_what_is_wrong_with_them_is_said_with_the_key_of_the_file(axis, key):
-    whole = {"motor": {"kind": "torque_source", "rotor_inertia": 3e-4, "rated_torque": 2.0}, "slide": {"mass": 1.0}}
-    refused(lambda: lm.Scenario(axis=whole | {"screw": {"lead": 0.02}} | axis, simulation={"duration": 1, "sample_interval": 0.1}), key)
+)  # fmt: skip

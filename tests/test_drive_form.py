@@ -11,7 +11,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.simulation.forms.axis_form import file_schema
 from lostmotion.simulation.forms.key_aliases import DRIVE
-from refusals import refusals_of, refused
+from refusals import file_of, refusals_of, refused
 from tables import rated_gearbox, run_of, torque_source
 
 MOVES = {"moves": [{"to": "90 deg"}], "speed": "3 rad/s", "acceleration": "20 rad/s^2", "jerk": "800 rad/s^3"}
@@ -169,12 +169,9 @@ def test_a_slide_of_an_axis_moves_as_it_is_given(tmp_path: Path) -> None:
     assert result["slide_drive_force"].attrs["units"] == "N"
 
 
-@pytest.mark.parametrize(("keys", "message"), [
-    ("", 'has backlash but is rigid; give it a stiffness, such as "200 N/um", or the restitution of its flanks, 0 to 1'),
-    ('restitution = 0.5\nstiffness = "100 N/um"', "has a restitution and a stiffness"),
+test_what_flanks_of_a_rack_need_is_said = refusals_of(
+    lambda keys, *, tmp_path: lm.load(file_of(tmp_path / "axis.toml", AXIS.replace("RIGID", keys).replace("MOVED", ""))),
+    ("", 'axis.rack: has backlash but is rigid; give it a stiffness, such as "200 N/um", or the restitution of its flanks, 0 to 1'),
+    ('restitution = 0.5\nstiffness = "100 N/um"', "axis.rack: has a restitution and a stiffness"),
     ("restitution = 1.5", "axis.rack.restitution"),
-])  # fmt: skip
-def test_what_flanks_of_a_rack_need_is_said(tmp_path: Path, keys: str, message: str) -> None:
-    path = tmp_path / "axis.toml"
-    path.write_text(AXIS.replace("RIGID", keys).replace("MOVED", ""))
-    assert message in refused(lambda: lm.load(path))
+)  # fmt: skip

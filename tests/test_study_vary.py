@@ -23,7 +23,7 @@ from lostmotion.studies.expressions.expressions import OF_THE_RUN, read_expressi
 from lostmotion.studies.expressions.functions import FUNCTIONS, METHODS
 from lostmotion.studies.expressions.vocabulary import vocabulary_of
 from lostmotion.studies.runs.chunk import scenario_of_run
-from refusals import refused
+from refusals import refusals_of, refused
 
 JOINT = ROOT / "scenarios" / "catalogue-robot-joint.toml"
 OVERRUNNING = ROOT / "scenarios" / "overrunning-load.toml"
@@ -122,25 +122,19 @@ def test_runs_that_fail_are_counted_on_the_command_line(tmp_path: Path):
     assert [bool(error) for error in rows["error"]] == [False, True]
 
 
-@pytest.mark.parametrize(
-    ("text", "sentence"),
-    [
-        ('key = "gearbox"\ncatalogue = { ratio = [120, 50] }', "has catalogue.ratio = [120, 50], which is reversed"),
-        ('key = "gearbox"\ncatalogue = { ratio = [120] }', "has catalogue.ratio = [120]; it must be a list of minimum"),
-        ('key = "gearbox"\ncatalogue = { kind = ["worm", true] }', 'catalogue.kind = ["worm", true]; it must be a text'),
-        ('key = "gearbox"\ncatalogue = ["worm"]', 'has catalogue = ["worm"]; it must be a table'),
-        ('key = "gearbox"\nvalues = [true]', "has the value true, which is no name of a gearbox"),
-        ('key = "temperature"\nvalues = [20]', "did you mean gearbox.temperature?"),
-        ('key = "inertja"\nvalues = [20]', "varies inertja, which the base scenario does not know (there is no inertja)"),
-        ('key = "motor.inertia"\nvalues = [20]', "does not know (there is no inertia)"),  # that of the load is another one
-        ('key = "gearbox.backlash"\nvalues = [0]', "did you mean gearbox.stiffness.backlash?"),
-        ('key = "load.inertai"\nvalues = [20]', "did you mean load.inertia?"),
-    ],
-)
-def test_what_is_wrong_with_a_parameter_is_said_in_the_words_of_the_file(tmp_path: Path, text: str, sentence: str):
-    message = refused(lambda: lm.studies.load_study(write(tmp_path, text)))
-    assert sentence in message
-    assert not re.search("True|'", message)
+test_what_is_wrong_with_a_parameter_is_said_in_the_words_of_the_file = refusals_of(
+    lambda text, *, tmp_path: lm.studies.load_study(write(tmp_path, text)),
+    ('key = "gearbox"\ncatalogue = { ratio = [120, 50] }', "vary[0]: has catalogue.ratio = [120, 50], which is reversed"),
+    ('key = "gearbox"\ncatalogue = { ratio = [120] }', "vary[0]: has catalogue.ratio = [120]; it must be a list of minimum"),
+    ('key = "gearbox"\ncatalogue = { kind = ["worm", true] }', 'vary[0]: catalogue.kind = ["worm", true]; it must be a text'),
+    ('key = "gearbox"\ncatalogue = ["worm"]', 'vary[0]: has catalogue = ["worm"]; it must be a table'),
+    ('key = "gearbox"\nvalues = [true]', ": has the value true, which is no name of a gearbox"),
+    ('key = "temperature"\nvalues = [20]', ": did you mean gearbox.temperature?"),
+    ('key = "inertja"\nvalues = [20]', ": varies inertja, which the base scenario does not know (there is no inertja)"),
+    ('key = "motor.inertia"\nvalues = [20]', ": does not know (there is no inertia)"),
+    ('key = "gearbox.backlash"\nvalues = [0]', ": did you mean gearbox.stiffness.backlash?"),
+    ('key = "load.inertai"\nvalues = [20]', ": did you mean load.inertia?"),
+)  # fmt: skip
 
 
 def test_the_catalogue_is_filtered_by_figures(tmp_path: Path):
@@ -185,46 +179,44 @@ def test_entries_of_lists_vary_and_lists_of_lists_are_scaled(tmp_path: Path):
     assert rows["lost"][1] < rows["lost"][0]
 
 
-@pytest.mark.parametrize(("text", "match"), [
-    ('key = "gearbox.stiffness"\nrelative = true\nvalues = [1, 2]', "is a table; vary one of its keys: gearbox.stif"),
-    ('key = "gearbox.stiffness"\nvalues = [1, 2]', "gearbox.stiffness.slopes"),
-    ('key = "command"\nrelative = true\nvalues = [1, 2]', "is a table"),
-    ('key = "load"\nvalues = [1, 2]', "is a table"),
-    ('key = "motor.voltage_limit"\nrelative = true\nvalues = [1, 2]', "no value there to multiply"),
-    ('key = "command.sines.0.amplitude"\nvalues = [1, 2]', "no entry 0; the list has 0 entries"),
-    ('key = "command.ramps.3.rise"\nvalues = [1, 2]', "no entry 3"),
-    ('key = "command.ramps.rise"\nvalues = [1, 2]', "'rise' is no index"),
-    ('key = "command.ramps"\nrelative = true\nvalues = [1, 2]', "is a list; vary its entries"),
-    ('key = "gearbox.stiffness.slopes"\nvalues = [1e4, 2e4]', "is a list; vary its entries"),
-    ('key = "command.chirp"\nvalues = [1, 2]', "does not have; give it there first"),
-    ('key = "motor.kind"\nvalues = [1, 2]', "no number"),
-    ('key = "title"\nvalues = [1, 2]', "no number"),
-    ('key = "gearbox.losses.mirrored"\nvalues = [0, 1]', "no number"),
-    ('key = "load.__class__"\nvalues = [1, 2]', "does not know"),
-    ('key = "drive"\nvalues = [1, 2]', "does not know"),
-    ('key = "gearbox.loss_factor"\nvalues = [1, 2]', "belongs beside `from`, but the gearbox of the base"),
-    ('key = "gearbox"\nvalues = ["schaeffler-rt1-h-20-10"]', "did you mean schaeffler-rt1-h-20-100"),
-    ('key = "gearbox"\nvalues = [1]', "which is no name of a gearbox"),
-    ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "is a motor; a gearbox is wanted here"),
-    ('key = "gearbox"\nvalues = ["none.toml"]', "no such file"),
-    ('key = "gearbox"\nuniform = [0, 1]', "needs? .*values or catalogue"),
-    ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
-    ('keys = ["gearbox", "load.inertia"]\nvalues = ["schaeffler-rt1-h-20-100"]', "a key of their own"),
-    ('key = "gearbox"\ncatalogue = { colour = "red" }', "colour, which is no datum of a gearbox"),
-    ('key = "gearbox"\ncatalogue = { ratio = 100 }', "list of minimum and maximum"),
-    ('key = "gearbox"\ncatalogue = { ratio = ["1 N", "2 N"] }', "ratio"),
-    ('key = "gearbox"\ncatalogue = { kind = "belt" }', "which no gearbox of the catalogue has"),
-    ('key = "gearbox"\ncatalogue = { kind = 1 }', "must be a text"),
-    ('key = "gearbox"\ncatalogue = "all"', "must be a table"),
-    ('key = "gearbox"\ncatalogue = {}\nvalues = ["schaeffler-rt1-h-20-100"]', "give one of the two"),
-    ('key = "load.inertia"\ncatalogue = {}', "which only gearbox"),
-    ('key = "load.inertia"\nvalues = ["schaeffler-rt1-h-20-100"]', "load.inertia"),
-    ('key = "load.inertai"\nvalues = ["1.5 kg*m^2"]', "does not know .*; did you mean load.inertia"),
-    ('key = "load.inertia"\nrelative = "no"\nvalues = [1, 2]', 'relative: "no"'),
-])  # fmt: skip
-def test_what_cannot_vary_ends_in_one_clear_line(tmp_path: Path, text: str, match: str):
-    path = write(tmp_path, text, base=OVERRUNNING)
-    assert refused(lambda: lm.studies.load_study(path), match=match).startswith(str(path))
+test_what_cannot_vary_ends_in_one_clear_line = refusals_of(
+    lambda text, *, tmp_path: lm.studies.load_study(write(tmp_path, text, base=OVERRUNNING)),
+    ('key = "gearbox.stiffness"\nrelative = true\nvalues = [1, 2]', ": is a table; vary one of its keys: gearbox.stif"),
+    ('key = "gearbox.stiffness"\nvalues = [1, 2]', ": gearbox.stiffness.slopes"),
+    ('key = "command"\nrelative = true\nvalues = [1, 2]', ": is a table"),
+    ('key = "load"\nvalues = [1, 2]', ": is a table"),
+    ('key = "motor.voltage_limit"\nrelative = true\nvalues = [1, 2]', ": no value there to multiply"),
+    ('key = "command.sines.0.amplitude"\nvalues = [1, 2]', ": no entry 0; the list has 0 entries"),
+    ('key = "command.ramps.3.rise"\nvalues = [1, 2]', ": no entry 3"),
+    ('key = "command.ramps.rise"\nvalues = [1, 2]', ": 'rise' is no index"),
+    ('key = "command.ramps"\nrelative = true\nvalues = [1, 2]', ": is a list; vary its entries"),
+    ('key = "gearbox.stiffness.slopes"\nvalues = [1e4, 2e4]', ": is a list; vary its entries"),
+    ('key = "command.chirp"\nvalues = [1, 2]', ": does not have; give it there first"),
+    ('key = "motor.kind"\nvalues = [1, 2]', ": no number"),
+    ('key = "title"\nvalues = [1, 2]', ": no number"),
+    ('key = "gearbox.losses.mirrored"\nvalues = [0, 1]', ": no number"),
+    ('key = "load.__class__"\nvalues = [1, 2]', ": does not know"),
+    ('key = "drive"\nvalues = [1, 2]', ": does not know"),
+    ('key = "gearbox.loss_factor"\nvalues = [1, 2]', ": belongs beside `from`, but the gearbox of the base"),
+    ('key = "gearbox"\nvalues = ["schaeffler-rt1-h-20-10"]', "vary[0]: did you mean schaeffler-rt1-h-20-100"),
+    ('key = "gearbox"\nvalues = [1]', ": which is no name of a gearbox"),
+    ('key = "gearbox"\nvalues = ["maxon-ec-i-52-606793"]', "vary[0]: is a motor; a gearbox is wanted here"),
+    ('key = "gearbox"\nvalues = ["none.toml"]', ": no such file"),
+    ('key = "gearbox"\nuniform = [0, 1]', "vary[0]: values or catalogue"),
+    ('key = "gearbox"\nrelative = true\nvalues = ["schaeffler-rt1-h-20-100"]', "vary[0]: a key of their own"),
+    ('keys = ["gearbox", "load.inertia"]\nvalues = ["schaeffler-rt1-h-20-100"]', "vary[0]: a key of their own"),
+    ('key = "gearbox"\ncatalogue = { colour = "red" }', "vary[0]: colour, which is no datum of a gearbox"),
+    ('key = "gearbox"\ncatalogue = { ratio = 100 }', "vary[0]: list of minimum and maximum"),
+    ('key = "gearbox"\ncatalogue = { ratio = ["1 N", "2 N"] }', "vary[0]: ratio"),
+    ('key = "gearbox"\ncatalogue = { kind = "belt" }', "vary[0]: which no gearbox of the catalogue has"),
+    ('key = "gearbox"\ncatalogue = { kind = 1 }', "vary[0]: must be a text"),
+    ('key = "gearbox"\ncatalogue = "all"', "vary[0]: must be a table"),
+    ('key = "gearbox"\ncatalogue = {}\nvalues = ["schaeffler-rt1-h-20-100"]', "vary[0]: give one of the two"),
+    ('key = "load.inertia"\ncatalogue = {}', "vary[0]: which only gearbox"),
+    ('key = "load.inertia"\nvalues = ["schaeffler-rt1-h-20-100"]', "vary[0]: load.inertia"),
+    ('key = "load.inertai"\nvalues = ["1.5 kg*m^2"]', ": ; did you mean load.inertia"),
+    ('key = "load.inertia"\nrelative = "no"\nvalues = [1, 2]', 'vary[0].relative: "no"'),
+)  # fmt: skip
 
 
 def test_a_record_varied_twice_is_refused(tmp_path: Path):

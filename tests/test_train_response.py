@@ -10,7 +10,7 @@ from typer.testing import CliRunner
 
 import lostmotion as lm
 from lostmotion.cli import app
-from refusals import refused
+from refusals import refusals_of
 from tables import gear_between, torque_source
 
 RUN = {"duration": 1.0, "sample_interval": 1e-3}
@@ -164,20 +164,24 @@ def test_several_threads_give_the_same_bits() -> None:
 
 
 REFUSED = [
-    (lambda t: lm.frequency_response(t, [1.0], [0.1]), "source is missing, and there is not one motor alone; name an input: "),
-    (lambda t: lm.frequency_response(t, [1.0], [0.1], source="command"), 'source "command" is not known; it must be '),
-    (lambda t: lm.response.bandwidth(t, 0.1, source="left_command", output="load_speed"), 'output "load_speed" is not known'),
-    (lambda t: lm.frequency_response(t, [1.0], [0.1], source="left_command", mean_command=0.1), "mean_command: there are several"),
-    (lambda t: lm.periodic_motion(t, 0.1), "command: there are several"),
-    (lm.periodic_motion, "needs at least one sine"),
+    (lambda t: lm.frequency_response(t, [1.0], [0.1]), ": source is missing, and there is not one motor alone; name an input: "),
+    (lambda t: lm.frequency_response(t, [1.0], [0.1], source="command"), ': source "command" is not known; it must be '),
+    (lambda t: lm.response.bandwidth(t, 0.1, source="left_command", output="load_speed"), ': output "load_speed" is not known'),
+    (lambda t: lm.frequency_response(t, [1.0], [0.1], source="left_command", mean_command=0.1), ": mean_command: there are several"),
+    (lambda t: lm.periodic_motion(t, 0.1), ": command: there are several"),
+    (lm.periodic_motion, ": needs at least one sine"),
 ]
 
 
-@pytest.mark.parametrize(("call", "message"), REFUSED)
-def test_what_a_response_of_a_train_refuses(call: Any, message: str) -> None:
-    tables = {k: v for k, v in TWO_STAGES.items() if k != "command"}
-    motors = dict.fromkeys(("left", "right"), TWO_STAGES["motors"]["m"])
-    assert message in refused(lambda: call(lm.Scenario(**{**tables, "motors": motors})))
+test_what_a_response_of_a_train_refuses = refusals_of(
+    lambda call: call(
+        lm.Scenario(
+            **{k: v for k, v in TWO_STAGES.items() if k != "command"}
+            | {"motors": dict.fromkeys(("left", "right"), TWO_STAGES["motors"]["m"])}
+        )
+    ),
+    *REFUSED,
+)
 
 
 def test_rest_is_the_same_start_in_both_words() -> None:

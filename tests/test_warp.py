@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
-from refusals import refused
+from refusals import refusals
 
 wp = pytest.importorskip("warp")
 pytestmark = pytest.mark.usefixtures("fast_compiles")
@@ -112,18 +112,15 @@ def test_the_same_bits_for_any_number_of_drives() -> None:
     assert np.array_equal(few["load_angle"].numpy(), many["load_angle"].numpy()[7:12])
 
 
-@pytest.mark.parametrize(("use", "message"), [
-    (lambda: lm.warp.Drives(lm.load("two-motors-one-ring"), count=2), "drive: "),
-    (lambda: lm.warp.Drives(lm.load("position-axis"), count=2), "a controller"),
-    (lambda: lm.warp.Drives(geared(1e-3), count=2, vary={"load.mass": 1.0}), "load.mass"),
-    (lambda: lm.warp.Drives(geared(0.0), count=2, vary={"gearbox.stiffness.backlash": 1e-3}), "backlash"),
-    (lambda: lm.warp.Drives(geared(1e-3), count=2)["angle"], "angle"),
+test_what_the_kernel_does_not_take_is_refused = refusals(
+    (lambda: lm.warp.Drives(lm.load("two-motors-one-ring"), count=2), ": drive: "),
+    (lambda: lm.warp.Drives(lm.load("position-axis"), count=2), ": a controller"),
+    (lambda: lm.warp.Drives(geared(1e-3), count=2, vary={"load.mass": 1.0}), ": load.mass"),
+    (lambda: lm.warp.Drives(geared(0.0), count=2, vary={"gearbox.stiffness.backlash": 1e-3}), ": backlash"),
+    (lambda: lm.warp.Drives(geared(1e-3), count=2)["angle"], ": angle"),
     (lambda: lm.warp.Drives(geared(1e-3), count=2, vary={"load.inertia": [1.0, -1.0]}), "load.inertia"),
-    (lambda: lm.warp.Drives(geared(1e-3), count=2, vary={"load.inertia": [1.0, 2.0, 3.0]}), r"vary\.load\.inertia: .*2 numbers"),
-    (lambda: lm.warp.Drives(geared(1e-3), count=2, device="cpu").step(np.zeros(3)), "command: .*2 numbers, one for each drive"),
-    (lambda: lm.warp.Drives(geared(1e-3), count=2, device="cpu").step(0.1, np.nan), "load_torque: .*not finite"),
-    (lambda: lm.warp.Drives(geared(1e-3), count=2, device="cpu").reset([1, 0]), "which: .*2 Booleans"),
-])  # fmt: skip
-def test_what_the_kernel_does_not_take_is_refused(use: object, message: str) -> None:
-    assert callable(use)
-    refused(use, match=message)
+    (lambda: lm.warp.Drives(geared(1e-3), count=2, vary={"load.inertia": [1.0, 2.0, 3.0]}), ": 2 numbers"),
+    (lambda: lm.warp.Drives(geared(1e-3), count=2, device="cpu").step(np.zeros(3)), ": 2 numbers, one for each drive"),
+    (lambda: lm.warp.Drives(geared(1e-3), count=2, device="cpu").step(0.1, np.nan), ": not finite"),
+    (lambda: lm.warp.Drives(geared(1e-3), count=2, device="cpu").reset([1, 0]), ": 2 Booleans"),
+)  # fmt: skip
