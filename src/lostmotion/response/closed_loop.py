@@ -65,7 +65,6 @@ class ClosedLoop:
     """A scenario with controllers under one sine."""
 
     def __init__(self, plant: Plant, source: str, amplitude: float, window: Window, law: Any) -> None:
-        assert plant.closed is not None
         self.plant, self.window = plant, window
         self.simulation = _UnderSine(plant, source, amplitude, window.frequency, law)
         self.core, control = solver_of(self.simulation)
@@ -160,9 +159,7 @@ def mean_of(reference: AnyReference) -> float:
 
 def under_sine(plant: Plant, source: str, amplitude: float, frequency: float) -> Scenario:
     """The scenario with references that are constant but for the source, which is a sine."""
-    scenario = plant.closed
-    assert scenario is not None
-    axes = {}
+    scenario, axes = plant.scenario, {}
     for motor, controller in scenario.axes().items():
         name = scenario.train().variable(motor, "reference")
         wave = {"amplitude": amplitude, "frequency": frequency} if name == source else {}
@@ -178,9 +175,7 @@ class Search:
     def __init__(self, loop: ClosedLoop, signals: Sequence[AxisSignal], max_periods: int) -> None:
         self.loop, self.signals = loop, signals
         self.most = max(max_periods // loop.window.periods, 2)
-        scenario = loop.plant.closed
-        assert scenario is not None
-        axes = scenario.axes().values()
+        axes = loop.plant.scenario.axes().values()
         self.free = any(c.reference.kind != "position" for c in axes)
         encoders = [e for c in axes for e in (c.encoder, c.position_encoder) if e is not None]
         self.quantised = any(e.step > 0.0 for e in encoders)

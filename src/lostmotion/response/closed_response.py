@@ -20,8 +20,7 @@ from .windows import Window, fitting
 
 def windows_for(plant: Plant, frequencies: Sequence[float]) -> list[Window]:
     """The nearest frequencies whose periods fit the sample times, each once."""
-    assert plant.closed is not None
-    tick, frame = frame_of(plant.closed)
+    tick, frame = frame_of(plant.scenario)
     found = [fitting(f, tick, frame) for f in frequencies]
     return list({w.frequency: w for w in reversed(found)}.values())[::-1]
 
@@ -85,8 +84,7 @@ def respond_closed(
     progress: Callable[[], None] | None,
 ) -> dict[str, Any]:
     """Arrays as `respond` returns them for open loops, with a row for each amplitude and window."""
-    assert plant.closed is not None
-    signals = list(axis_signals(plant.closed))
+    signals = list(axis_signals(plant.scenario))
 
     def row(point: tuple[float, Window]) -> dict[str, Any]:
         amplitude, window = point
@@ -145,9 +143,7 @@ def _harmonics(angles: np.ndarray, y: np.ndarray, harmonics: int, periods: int) 
 def _powers(plant: Plant, samples: np.ndarray) -> dict[str, float]:
     """Mean powers of the samples [W]: of all motors, out of the last gears, lost in all gears."""
     values = dict(zip(plant.channels, samples, strict=False))
-    scenario = plant.closed
-    assert scenario is not None
-    motors, gears = _of_train(scenario.train())
+    motors, gears = _of_train(plant.scenario.train())
 
     def power(torque: str, speed: str) -> float:
         return float(np.mean(values[torque] * values[speed]))

@@ -119,11 +119,11 @@ def frequency_response(
         "give fewer of them, or fewer harmonics",
     )
     plant = plant.with_means(mean_command, mean_load_torque)
-    if plant.closed is None and law is not None:
+    if law is not None and not plant.closed:
         raise InputError("law: the scenario has no controller with law = true; set it, or leave law out")
     options: dict[str, Any] = {"harmonics": harmonics, "max_periods": max_periods, "progress": progress}
-    respond: Callable[..., xarray.Dataset] = _of_open_loop if plant.closed is None else _of_closed_loop
-    own = {"threads": threads} if plant.closed is None else {"law": law, "threads": threads or os.cpu_count() or 1}
+    respond: Callable[..., xarray.Dataset] = _of_closed_loop if plant.closed else _of_open_loop
+    own = {"law": law, "threads": threads or os.cpu_count() or 1} if plant.closed else {"threads": threads}
     compute = partial(respond, plant, amplitudes, source, **options, **own)
     result = compute(frequencies)
     for _ in range(4 if refine is not None else 0):

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
-
-import numpy as np
 
 from .. import _core
 from ..control.command import CommandSignal, CurrentLevel, FieldAngle
@@ -15,7 +14,6 @@ from ..errors import InputError
 from ..inputs.refusal_messages import listed, shown
 from ..model.drive import Drive
 from ..model.signals import Signal
-from ..model.train import DriveTrain
 from ..simulation.scenario.requirements import need_free_motion, need_open_loop
 from ..simulation.scenario.scenario import Scenario
 from ..simulation.variables import Variable
@@ -26,25 +24,53 @@ from ..simulation.variables_of_trains import REFERENCE_UNITS, axis_variables, on
 class Plant:
     """A drive or a train as the search for periodic motions takes it: with commands, or with controllers and their references."""
 
-    train: DriveTrain
-    core: _core.Train
+    scenario: Scenario
     signals: Mapping[str, Signal[Any]]  # by the name of their variable; of open loops in the order of the core
     source: str | None  # the input that is meant if none is named: command or reference of the only motor
-    start: Mapping[str, float]  # initial state of the scenario, by component; missing values are 0
-    rest: Mapping[str, float]
-    """initial state of responses: at rest, a train with the angles and twists of its scenario, on which gravity may depend"""
-    start_of: Callable[[Any], Mapping[str, float]]  # the same of another initial state
     channels: tuple[str, ...]
     variables: tuple[Variable, ...]  # the channels, and what is derived from them
-    derive: Callable[[dict[str, Any], np.ndarray], None]  # adds them to the channels, over time
     output: str  # the variable that is looked at if none is named: the speed of the load
-    angle: str  # angle whose advance over a period is reported: the load's
-    floors: Mapping[str, float]  # rated magnitudes of the variables by which motions are compared
-    scenario: Scenario
-    closed: Scenario | None = None  # the scenario, if it has controllers
-
     references: Mapping[str, AnyReference] = field(default_factory=dict)
     """references of its controllers, by the name of the input"""
+
+    @property
+    def closed(self) -> bool:
+        """Whether controllers turn its motors."""
+        return bool(self.references)
+
+    @cached_property
+    def start(self) -> dict[str, float]:
+        """Initial state of the scenario, by component; missing values are 0."""
+        return self.start_of(self.scenario.initial)
+
+    @cached_property
+    def rest(self) -> dict[str, float]:
+        """Initial state of responses: at rest, with the angles and twists of the scenario, on which gravity may depend."""
+        return self.start_of(self.scenario.tables.initial.at_rest())
+
+    def start_of(self, initial: Any) -> dict[str, float]:
+        """The same of another initial state."""
+        scenario, train = self.scenario, self.scenario.train()
+        capacities = scenario.capacities(initial).items()
+        return scenario.start(initial) | {train.variable(name, "hysteresis_capacity"): h for name, h in capacities}
+
+    @property
+    def angle(self) -> str:
+        """Angle whose advance over a period is reported: the angle of the load."""
+        train = self.scenario.train()
+        return train.variable(list(train.shafts)[-1], "angle")
+
+    def floors(self) -> dict[str, float]:
+        """Rated magnitudes of the variables by which motions are compared."""
+        train = self.scenario.train()
+        found = {train.variable(name, "speed"): 0.0 for name in train.shafts}
+        for name, gear in train.gears.items():
+            found |= {train.variable(name, "output_torque"): gear.rated_output_torque or 0.0}
+            found |= {train.variable(name, "twist"): 0.0}
+            if (rated := gear.rated_input_speed) is not None:
+                found |= {train.variable(gear.input, "speed"): rated}
+                found |= {train.variable(gear.output, "speed"): rated / abs(gear.ratio)}
+        return found
 
     def known_source(self, source: str | None) -> str:
         """The name of an input, if it is one, or of the only motor's command or reference."""
@@ -75,11 +101,11 @@ class Plant:
         for word, mean in (("command", command), ("load_torque", load_torque)):
             if mean is None:
                 continue
-            if word == "command" and self.closed is not None:
+            if word == "command" and self.closed:
                 raise InputError(
                     "mean_command: a controller turns the motor; the constant part of its reference is that of the scenario"
                 )
-            wanted[only_input(self.train, word, self.signals, f"mean_{word}")] = mean
+            wanted[only_input(self.scenario.train(), word, self.signals, f"mean_{word}")] = mean
         means = {name: type(s)(mean=wanted.get(name, s.mean)) for name, s in self.signals.items()}
         return replace(self, signals=means)
 
@@ -128,7 +154,6 @@ def plant_or_loop(drive: Drive | Scenario) -> Plant:
         channels=(*plant.channels, *(v.name for v in own)),
         variables=(*plant.variables, *own),
         output=train.variable(first, measured),
-        closed=what,
     )
 
 
@@ -136,43 +161,17 @@ def _plant_of(scenario: Scenario) -> Plant:
     need_free_motion(scenario, "response")
     train = scenario.train()
     core = scenario.core(sampled=False)
-    signals = scenario.signals()
-    last = list(train.shafts)[-1]
-    source = None
+    signals, source = scenario.signals(), None
     if len(train.motors) == 1:
         motor = next(iter(train.motors))
         source = train.variable(motor, "reference" if motor in scenario.continuous() else "command")
-
-    def start_of(initial: Any) -> dict[str, float]:
-        capacities = scenario.capacities(initial).items()
-        return scenario.start(initial) | {train.variable(name, "hysteresis_capacity"): h for name, h in capacities}
-
-    floors = {train.variable(name, "speed"): 0.0 for name in train.shafts}
-    for name, gear in train.gears.items():
-        floors |= {
-            train.variable(name, "output_torque"): gear.rated_output_torque or 0.0,
-            train.variable(name, "twist"): 0.0,
-        }
-        if gear.rated_input_speed is not None:
-            floors |= {
-                train.variable(gear.input, "speed"): gear.rated_input_speed,
-                train.variable(gear.output, "speed"): gear.rated_input_speed / abs(gear.ratio),
-            }
     return Plant(
-        train=train,
-        core=core,
+        scenario=scenario,
         signals={name: _without_steps(signals[name]) for name in core.input_names()},
         source=source,
-        start=start_of(scenario.initial),
-        rest=start_of(scenario.tables.initial.at_rest()),
-        start_of=start_of,
         channels=tuple(name for name, *_ in core.channels()),
         variables=scenario.variables(),
-        derive=scenario.derive,
-        output=train.variable(last, "speed"),
-        angle=train.variable(last, "angle"),
-        floors=floors,
-        scenario=scenario,
+        output=train.variable(list(train.shafts)[-1], "speed"),
     )
 
 

@@ -64,7 +64,7 @@ def respond(
     Of a limit cycle, under constant inputs, the periods are first estimates.
     """
     result = _core.respond(
-        plant.core,
+        plant.scenario.core(sampled=False),
         points,
         samples=SAMPLES_PER_PERIOD,
         harmonics=harmonics,
@@ -163,7 +163,7 @@ def _replaced(plant: Plant, given: Mapping[str, Any]) -> dict[str, Signal[Any]]:
     out = dict(plant.signals)
     for word, value in given.items():
         if value is not None:
-            name = only_input(plant.train, word, out)
+            name = only_input(plant.scenario.train(), word, out)
             out[name] = constant_or(value, type(out[name]))
     return out
 
@@ -174,7 +174,7 @@ def motion_of(r: dict[str, Any], plant: Plant, period: float) -> xarray.Dataset:
 
     data = dict(zip(plant.channels, r["table"][0], strict=True))
     time = np.arange(SAMPLES_PER_PERIOD) * (period / SAMPLES_PER_PERIOD)
-    plant.derive(data, time)
+    plant.scenario.derive(data, time)
     multipliers = floquet_multipliers(r, 0)
     variables: dict[str, Any] = {
         v.name: ("time", data[v.name], {"units": v.unit, "long_name": v.meaning, "symbol": v.symbol})
@@ -252,7 +252,7 @@ def periodic_motions(
     >>> len(lm.response.periodic_motions(lm.load("paper-2dof-nl-small"), starts=starts))
     1
     """
-    floors = plant_of(drive).floors
+    floors = plant_of(drive).floors()
     found: list[xarray.Dataset] = []
     starts = list(starts)
     for multiple in multiples:
