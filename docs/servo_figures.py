@@ -5,7 +5,7 @@ from __future__ import annotations
 from pathlib import Path
 
 import numpy as np
-from figure_files import save
+from figure_files import following_error, save
 
 import lostmotion as lm
 from lostmotion.reports.figure_style import FIRST, SECOND, THIRD
@@ -40,9 +40,7 @@ def errors(out: Path, scenarios: dict[str, lm.Scenario]) -> None:
     """Following error over the run, before and after."""
     curves = []
     for (name, scenario), style in zip(list(scenarios.items())[:3], (THIRD, SECOND, FIRST), strict=True):
-        run = lm.simulate(scenario, energy=False)
-        t = run["time"].to_numpy()
-        error = scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()  # type: ignore[union-attr]
+        t, error = following_error(scenario)
         curves.append(Curve(name, t, ARCMIN * error, style))
     panel = Panel("there and back: reference less angle of the load", "time [s]", "error [arcmin]", tuple(curves))
     save([panel], 1, (8.0, 3.4), out, "servo-errors")
@@ -86,10 +84,3 @@ def write(out: Path) -> None:
     errors(out, scenarios)
     loops(out, scenarios["tuned by margins"])
     hunting(out, scenarios["hunting"])
-
-
-if __name__ == "__main__":
-    from generate import OUT
-
-    OUT.mkdir(exist_ok=True)
-    write(OUT)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from figure_files import save
+from figure_files import following_error, save
 
 import lostmotion as lm
 from lostmotion.reports.figure_style import FAINT, FIRST, SECOND, THIRD
@@ -49,9 +49,7 @@ def axis(peak_speed: float, model: dict[str, Any] | None) -> lm.Scenario:
 
 def peak_error(scenario: lm.Scenario, after: float) -> float:
     """Of the load [rad]."""
-    run = lm.simulate(scenario, energy=False)
-    t = run["time"].to_numpy()
-    error = scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()  # type: ignore[union-attr]
+    t, error = following_error(scenario)
     return float(np.abs(error)[t > after].max())
 
 
@@ -100,7 +98,7 @@ def by_camera(out: Path) -> None:
     }
     errors = []
     for label, (scenario, style) in ways.items():
-        t, error = _error(scenario)
+        t, error = following_error(scenario)
         errors.append(Curve(label, t[t > SETTLED], 1e3 * error[t > SETTLED], style))
     latencies = np.array([0.0, 0.02, 0.04, 0.06, 0.08, 0.1])
     over = []
@@ -117,15 +115,8 @@ def by_camera(out: Path) -> None:
 SETTLED = 2.0  # s, after which the tracker has found the target
 
 
-def _error(scenario: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Instants [s], and the reference less the load [rad]."""
-    run = lm.simulate(scenario, energy=False)
-    t = run["time"].to_numpy()
-    return t, scenario.controller.reference.at(t)[0] - run["load_angle"].to_numpy()
-
-
 def _rms(scenario: Any) -> float:
-    t, error = _error(scenario)
+    t, error = following_error(scenario)
     return float(np.sqrt(np.mean(error[t > SETTLED] ** 2)))
 
 
@@ -134,10 +125,3 @@ def write(out: Path) -> None:
     over_amplitude(out)
     fly_by(out)
     by_camera(out)
-
-
-if __name__ == "__main__":
-    from generate import OUT
-
-    OUT.mkdir(exist_ok=True)
-    write(OUT)
