@@ -4,7 +4,6 @@ They know nothing of tasks and records; `axis_rules` compares what they give wit
 """
 
 import math
-from collections.abc import Sequence
 
 from ..model.screw import ELASTIC_MODULUS, STEEL
 
@@ -29,19 +28,6 @@ TEETH_IN_MESH = 12  # that carry at most
 SEA_LEVEL = 1000.0  # [m], up to which ratings hold
 HEIGHT = 1e4  # [m]: 1 % of the torque to each 100 m
 WARM = 40.0  # [degC], up to which ratings of servo motors hold
-
-
-def rms(values: Sequence[float], times: Sequence[float]) -> float:
-    """Root mean square of values that last for some time each: sqrt(sum T^2 t / sum t).
-
-    Source: THK general catalogue, A-735; maxon, Formulae Handbook.
-
-    Examples
-    --------
-    >>> round(rms([4730, 120, 4490, 0], [0.15, 0.85, 0.15, 2.6]))
-    1306
-    """
-    return math.sqrt(sum(x * x * t for x, t in zip(values, times, strict=True)) / sum(times))
 
 
 def buckling_force(core_diameter: float, length: float, mounting: str, modulus: float = ELASTIC_MODULUS) -> float:
@@ -100,19 +86,6 @@ def dn_speed(ball_circle_diameter: float, dn: float = 70.0) -> float:
     3373
     """
     return dn / ball_circle_diameter * math.pi / 30.0
-
-
-def screw_torque(force: float, lead: float, efficiency: float) -> float:
-    """Torque [N m] at a screw that drives an axial force: F p/(2 pi eta).
-
-    Source: THK general catalogue, A-666.
-
-    Examples
-    --------
-    >>> round(1e3 * screw_torque(14.7, 10e-3, 0.96))  # THK A-666: 24 N mm
-    24
-    """
-    return force * lead / (2.0 * math.pi * efficiency)
 
 
 def belt_force(circumferential: float, pretension: float | None = None) -> float:
