@@ -316,8 +316,8 @@ def test_a_limit_of_the_voltage_acts(kind: str, mode: str, source: str) -> None:
     scenario = run_up(kind, mode)
     if source != "dc":
         scenario["motors"]["m"] = motor(LINE, "field_oriented", TAU) | {"kind": source}
-    refused = {("field_oriented", "dc"), ("field_oriented", "torque_source"), ("pi", "torque_source")}
-    if (kind, source) in refused:
+    impossible = {("field_oriented", "dc"), ("field_oriented", "torque_source"), ("pi", "torque_source")}
+    if (kind, source) in impossible:
         if source == "dc":
             scenario["motors"]["m"] = motor(LINE, "pi", TAU)
         refused(lambda: lm.Scenario(**scenario), match=f'controllers.m.current.kind: "{kind}" needs a motor')
