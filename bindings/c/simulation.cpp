@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "lostmotion/analysis/train_linear.hpp"
-#include "lostmotion/scenario/linear.hpp"
+#include "lostmotion/scenario/linear_model.hpp"
 #include "objects.hpp"
 
 namespace lm = lostmotion;

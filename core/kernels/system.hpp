@@ -5,11 +5,11 @@
 #include <optional>
 #include <vector>
 
-#include "going_on.hpp"
 #include "lostmotion/model/scales.hpp"
 #include "lostmotion/model/switched_train.hpp"
 #include "lostmotion/parts/stepper_winding.hpp"
 #include "pack.hpp"
+#include "unchanged_contacts.hpp"
 
 namespace lostmotion::model {
 
@@ -53,7 +53,7 @@ class TrainSystem {
         if (out->guards.size() > static_cast<std::size_t>(D::guards)) overflowed_ = true;
         return out;
     }
-    const std::vector<Regime::Flow>& flows(const Regime& r) const { return search_.regimes().flows(r); }
+    const std::vector<Regime::PowerTerms>& flows(const Regime& r) const { return search_.regimes().flows(r); }
     // In these modes, at the instant and the torques of another regime.
     std::shared_ptr<const Regime> build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
         return build(search_.branches_at(other, modes, by_layout(now)));
@@ -158,7 +158,7 @@ class TrainSystem {
             const ShaftPlace& shaft = places.shafts[static_cast<std::size_t>(assembly_.train().motors[m].shaft)];
             const double level = p.level == nowhere ? 1.0 : u[p.level];
             const auto flow =
-                winding.flow({x[shaft.angle], x[shaft.speed], u[p.command], level, {x[p.current], x[p.current + 1]}});
+                winding.rates({x[shaft.angle], x[shaft.speed], u[p.command], level, {x[p.current], x[p.current + 1]}});
             u[p.winding] = flow.torque;
             for (int k = 0; k < 2; ++k) u[p.winding + 1 + k] = flow.rate[static_cast<std::size_t>(k)];
             if (rate != nullptr) (*rate)[p.winding] = flow.torque_rate;

@@ -13,7 +13,7 @@
 #include <cstdint>
 #include <optional>
 
-#include "components.hpp"
+#include "reset_jacobian.hpp"
 #include "lostmotion/solver/exact_solver.hpp"
 
 namespace lostmotion {

@@ -1,7 +1,7 @@
 // Periodic motions and responses of a train.
 #pragma once
 
-#include "components.hpp"
+#include "reset_jacobian.hpp"
 #include "lostmotion/simulation/train_status.hpp"
 #include "response.hpp"
 #include "sampler.hpp"

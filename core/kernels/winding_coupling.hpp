@@ -17,7 +17,7 @@
 #include "lostmotion/base/status.hpp"
 #include "lostmotion/control/axis.hpp"
 #include "lostmotion/kernel/form.hpp"
-#include "lostmotion/model/motion.hpp"
+#include "lostmotion/model/instant.hpp"
 
 namespace lostmotion {
 

@@ -10,7 +10,7 @@
 #include "lostmotion/model/shaft_angle.hpp"
 #include "random_trains.hpp"
 #include "recorded.hpp"
-#include "train_steps.hpp"
+#include "time_stepping.hpp"
 
 namespace lostmotion::model {
 

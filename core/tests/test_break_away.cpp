@@ -3,7 +3,7 @@
 
 #include "random_trains.hpp"
 #include "regularised_contacts.hpp"
-#include "train_run.hpp"
+#include "plain_integrator.hpp"
 
 TEST_SUITE_BEGIN("break_away");
 

@@ -1,7 +1,7 @@
 // Whole trains whose motion is known: chains, a worm on a coupling, two motors on one ring, play with damping.
 #include <doctest/doctest.h>
 
-#include "train_run.hpp"
+#include "plain_integrator.hpp"
 
 TEST_SUITE_BEGIN("train_cases");
 

@@ -2,7 +2,7 @@
 #include <doctest/doctest.h>
 
 #include "random_trains.hpp"
-#include "train_run.hpp"
+#include "plain_integrator.hpp"
 
 TEST_SUITE_BEGIN("train_elements");
 

@@ -7,7 +7,7 @@
 #include "lostmotion/solver/regime_cache.hpp"
 #include "random_trains.hpp"
 #include "referee_polynomial.hpp"
-#include "train_run.hpp"
+#include "plain_integrator.hpp"
 
 TEST_SUITE_BEGIN("train_modes");
 

@@ -4,7 +4,7 @@
 #include <algorithm>
 
 #include "kernels/pack.hpp"
-#include "lostmotion/model/power.hpp"
+#include "lostmotion/model/power_flows.hpp"
 #include "lostmotion/model/switched_train.hpp"
 #include "support.hpp"
 

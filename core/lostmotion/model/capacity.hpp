@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "assembly.hpp"
-#include "motion.hpp"
+#include "instant.hpp"
 
 namespace lostmotion::model {
 

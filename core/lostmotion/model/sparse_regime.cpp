@@ -1,6 +1,6 @@
 #include "sparse_regime.hpp"
 
-#include "power.hpp"
+#include "power_flows.hpp"
 #include "scales.hpp"
 
 namespace lostmotion::model {
@@ -147,15 +147,15 @@ void SparseRegimes::make_room() {
     bytes_ = 0;
 }
 
-const std::vector<SparseRegime::Flow>& SparseRegimes::flows(const SparseRegime& r) {
+const std::vector<SparseRegime::PowerTerms>& SparseRegimes::flows(const SparseRegime& r) {
     if (r.flows == nullptr) {
-        auto flows = std::make_unique<SparseRegime::Flows>();
+        auto flows = std::make_unique<SparseRegime::AllPowers>();
         const std::vector<NumberedPower> powers = power_flows(assembly_, composed(r.key));
         form_.begin(assembly_.layout(), 2 * powers.size());
         for (const NumberedPower& f : powers)
             flows->all.push_back({f.flow, form_(f.power.torque), form_(f.power.speed)});
         flows->block = form_.block();
-        for (SparseRegime::Flow& f : flows->all)
+        for (SparseRegime::PowerTerms& f : flows->all)
             for (LinearForm* form : {&f.torque, &f.speed}) form_.move(*form, flows->block);
         r.flows = std::move(flows);
     }

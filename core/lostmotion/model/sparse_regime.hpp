@@ -9,7 +9,7 @@
 #include "../base/key_table.hpp"
 #include "../base/signal.hpp"
 #include "assembly.hpp"
-#include "motion.hpp"
+#include "instant.hpp"
 
 namespace lostmotion::model {
 
@@ -34,15 +34,15 @@ struct SparseRegime {
     int driving_input = -1;
     double driving_way = 0.0;
     // A product of two forms, and its number among all flows of power; they are set once they are asked for.
-    struct Flow {
+    struct PowerTerms {
         int number;
         LinearForm torque, speed;
     };
-    struct Flows {
-        std::vector<Flow> all;
+    struct AllPowers {
+        std::vector<PowerTerms> all;
         FormMaker::Terms block;
     };
-    mutable std::unique_ptr<const Flows> flows;
+    mutable std::unique_ptr<const AllPowers> flows;
 
     // near_state, near_input: what states and inputs have near an event, by the layout.
     SparseRegime(const Regime& r, const Assembly& a, std::span<const double> near_state,
@@ -73,7 +73,7 @@ class SparseRegimes {
     // Forgets all regimes if they take more memory than is to be kept.
     void make_room();
     // The flows of power of a regime.
-    const std::vector<SparseRegime::Flow>& flows(const SparseRegime& r);
+    const std::vector<SparseRegime::PowerTerms>& flows(const SparseRegime& r);
 
  private:
     static constexpr std::size_t most_bytes = std::size_t{16} << 20;

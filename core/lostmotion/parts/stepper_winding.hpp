@@ -23,13 +23,13 @@ struct StepperWinding {
 
     const Motor& motor;
 
-    struct Instant {
+    struct State {
         double angle, speed;        // [rad], [rad/s] of the rotor
         double field;               // [rad]
         double level;               // command of the current: below 1/2 it is reduced
         std::array<double, 2> i{};  // currents [A]
     };
-    struct Flow {
+    struct Rates {
         double torque, torque_rate;  // [N m], [N m/s]
         std::array<double, 2> rate;  // of the currents [A/s]
     };
@@ -40,7 +40,7 @@ struct StepperWinding {
         const auto [sin, cos] = sine_cosine(motor.pole_pairs() * field);
         return {most * cos, most * sin};
     }
-    Flow flow(const Instant& at) const {
+    Rates rates(const State& at) const {
         const double n = motor.pole_pairs(), R = motor.resistance_phase, L = motor.inductance_phase;
         const double K = motor.holding_torque / largest_current();
         const auto [sin, cos] = sine_cosine(n * at.angle);
@@ -50,7 +50,7 @@ struct StepperWinding {
             u[k] = R * want[k] + K * at.speed * turn[k] + regulation * L * (want[k] - at.i[k]);
         const double asked = std::sqrt(u[0] * u[0] + u[1] * u[1]);
         const double share = asked > motor.supply_voltage ? motor.supply_voltage / asked : 1.0;
-        Flow out{};
+        Rates out{};
         for (std::size_t k = 0; k < 2; ++k) {
             out.rate[k] = (share * u[k] - R * at.i[k] - K * at.speed * turn[k]) / L;
             out.torque += K * at.i[k] * turn[k];

@@ -4,7 +4,7 @@
 
 #include <vector>
 
-#include "../model/motion.hpp"
+#include "../model/instant.hpp"
 #include "train_channels.hpp"
 
 namespace lostmotion {

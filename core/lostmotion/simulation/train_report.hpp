@@ -13,7 +13,7 @@
 
 #include "../base/status.hpp"
 #include "../model/names.hpp"
-#include "../model/power.hpp"
+#include "../model/power_flows.hpp"
 #include "result_names.hpp"
 #include "sample_times.hpp"
 #include "train_control.hpp"

@@ -1,4 +1,4 @@
-#include "linear.hpp"
+#include "linear_model.hpp"
 
 namespace lostmotion {
 

@@ -1,4 +1,4 @@
-#include "power.hpp"
+#include "power_flows.hpp"
 
 #include "names.hpp"
 

@@ -5,7 +5,7 @@
 #include <string>
 #include <vector>
 
-#include "../parts/power.hpp"
+#include "../parts/element_powers.hpp"
 #include "assembly.hpp"
 
 namespace lostmotion::model {

@@ -2,9 +2,9 @@
 #include <doctest/doctest.h>
 
 #include "random_train_runs.hpp"
-#include "train_steps.hpp"
+#include "time_stepping.hpp"
 
-TEST_SUITE_BEGIN("train_steps");
+TEST_SUITE_BEGIN("time_stepping");
 
 namespace lostmotion::model {
 

@@ -4,7 +4,7 @@
 #include <memory>
 #include <unordered_map>
 
-#include "lostmotion/model/power.hpp"
+#include "lostmotion/model/power_flows.hpp"
 #include "train_support.hpp"
 
 namespace lostmotion::model {

@@ -1,4 +1,4 @@
-#include "motion.hpp"
+#include "instant.hpp"
 
 #include <algorithm>
 
