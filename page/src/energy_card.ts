@@ -2,7 +2,7 @@
 import type { Run } from "./core";
 import { h, svg } from "./dom";
 import { words } from "./kinematics";
-import { Seen } from "./seen";
+import { DrawnWhenVisible } from "./visible";
 import { format, shown } from "./units";
 
 export interface Flow {
@@ -39,7 +39,7 @@ const [LEFT, MIDDLE, RIGHT] = [150, 215, 290]; // ends of the ribbons
 
 export class EnergyCard {
   private readonly place = h("div", { class: "energy" });
-  private readonly seen = new Seen(
+  private readonly seen = new DrawnWhenVisible(
     this.place,
     () => this.run && this.place.replaceChildren(ribbons(this.run.energies)),
   );

@@ -1,7 +1,7 @@
 /** The page: what is shown, and what follows what. */
 import "./style.css";
 import { Actions } from "./actions";
-import { Beside } from "./beside";
+import { Background } from "./background";
 import { type Changes, changed, fromFragment, toFragment } from "./changes";
 import { Controls } from "./controls";
 import { Core, CoreError, type Run } from "./core";
@@ -15,13 +15,13 @@ import { MapCard } from "./map_card";
 import { Player } from "./player";
 import { PlayerBar } from "./player_bar";
 import { ResponseCard } from "./response_card";
-import { StandCard } from "./stand_card";
-import { Strip } from "./strip";
+import { StuckCard } from "./stuck_card";
+import { ContactStrip } from "./contact_strip";
 import { TimeCharts } from "./time_charts";
 import { format } from "./units";
 import { unpacked } from "./wasm";
 
-const LONG = 8; // ms of a run from which on the next one is worked out beside the page, which then goes on moving
+const LONG = 8; // ms of a run from which on the next one is computed in the background of the page, which then goes on moving
 // Of the first run: where this share takes longer, it is shown alone until the whole is there.
 const [BEGINNING, SHORT, LONG_COMPILED] = [1 / 64, 0.6, 20]; // ms
 
@@ -38,11 +38,11 @@ class Page {
   private readonly bar: PlayerBar;
   private readonly drawing = new Drawing();
   private readonly charts = new TimeCharts(byId("time-charts"), (time) => this.bar.hold(time));
-  private readonly strip = new Strip(byId("strip"));
+  private readonly strip = new ContactStrip(byId("strip"));
   private readonly loops = new LoopCard(byId("cards"));
   private readonly maps = new MapCard(byId("cards"));
-  private readonly beside: Beside;
-  private readonly stand: StandCard;
+  private readonly background: Background;
+  private readonly stand: StuckCard;
   private readonly energy = new EnergyCard(byId("cards"));
   private readonly margins: MarginCard;
   private readonly response: ResponseCard;
@@ -62,10 +62,10 @@ class Page {
     byId("drawing").append(this.drawing.root);
     this.player = new Player(this.d.core.duration, (time) => this.show(time));
     this.bar = new PlayerBar(byId("player"), this.player);
-    this.beside = new Beside(bytes);
-    this.stand = new StandCard(byId("cards"), this.beside);
+    this.background = new Background(bytes);
+    this.stand = new StuckCard(byId("cards"), this.background);
     this.margins = new MarginCard(byId("cards"), original);
-    this.response = new ResponseCard(byId("cards"), original, this.beside);
+    this.response = new ResponseCard(byId("cards"), original, this.background);
     this.controls = new Controls(byId("controls"), original.sliders, changes, () => this.later());
     this.actions = new Actions(byId("actions"), {
       pin: (on) => {
@@ -115,7 +115,7 @@ class Page {
   }
 
   private compute(): void {
-    if (this.long) this.computeBeside();
+    if (this.long) this.computeInBackground();
     else this.attempt(() => this.use(this.core.run(this.d.core)));
   }
 
@@ -134,11 +134,11 @@ class Page {
     this.long = true;
     this.take(beginning);
     this.say(`the first ${format(beginning.time.at(-1)!, 3)} s; the rest is being solved`, false);
-    whenShown(() => this.computeBeside()); // it would take the processor from what draws
+    whenShown(() => this.computeInBackground()); // it would take the processor from what draws
   }
 
-  private computeBeside(): void {
-    this.beside.ask({ kind: "run", input: this.d.core }, (answer) => {
+  private computeInBackground(): void {
+    this.background.ask({ kind: "run", input: this.d.core }, (answer) => {
       if (answer.kind === "run") this.use(answer.run);
       if (answer.kind === "failure") this.say(answer.message, true);
     });

@@ -5,7 +5,7 @@
  * look, and a redraw has to fit into a frame on a slow machine.
  */
 import { extent, padded } from "./extent";
-import { Seen } from "./seen";
+import { DrawnWhenVisible } from "./visible";
 import { format, logarithmicTicks, shown, ticks } from "./units";
 
 export interface Line {
@@ -76,7 +76,7 @@ export class Plot {
   private readonly canvas = document.createElement("canvas");
   private readonly cursor = document.createElement("div");
   private chart?: Chart;
-  private readonly seen: Seen;
+  private readonly seen: DrawnWhenVisible;
   private marked?: [number, number?];
   private width = 0;
   private height = 0;
@@ -95,7 +95,7 @@ export class Plot {
     this.canvas.setAttribute("aria-label", label);
     this.cursor.className = "cursor";
     this.root.append(this.canvas, this.cursor);
-    this.seen = new Seen(this.root, () => this.paint(), atOnce);
+    this.seen = new DrawnWhenVisible(this.root, () => this.paint(), atOnce);
     new ResizeObserver(() => this.fit()).observe(this.root);
   }
 

@@ -3,21 +3,21 @@ import { h } from "./dom";
 import { ribbons } from "./energy_card";
 import { LinesChart } from "./lines_chart";
 import { type ContactsData, type Packed, read } from "./packed";
-import { Strip } from "./strip";
+import { ContactStrip } from "./contact_strip";
 
 interface Drawn {
   draw(): void;
 }
 
 class Contacts implements Drawn {
-  private readonly strip: Strip;
+  private readonly strip: ContactStrip;
 
   constructor(
     place: HTMLElement,
     private readonly data: ContactsData,
     private readonly arrays: Packed["arrays"],
   ) {
-    this.strip = new Strip(place);
+    this.strip = new ContactStrip(place);
     new ResizeObserver(() => this.draw()).observe(place);
     this.draw();
   }

@@ -1,6 +1,6 @@
-/** Frequency response of the load's speed over the amplitude of the command, worked out beside the page. */
-import type { Beside } from "./beside";
-import type { Answer } from "./beside.worker";
+/** Frequency response of the load's speed over the amplitude of the command, computed in the background. */
+import type { Background } from "./background";
+import type { Answer } from "./background.worker";
 import type { Description } from "./description";
 import { h } from "./dom";
 import { unitsOf, words } from "./kinematics";
@@ -25,7 +25,7 @@ export class ResponseCard {
   constructor(
     root: HTMLElement,
     d: Description,
-    private readonly beside: Beside,
+    private readonly background: Background,
   ) {
     if (!d.open_loop || d.motors.length === 0) return;
     const [gain, phase] = [h("div", { class: "plot" }), h("div", { class: "plot low" })];
@@ -46,7 +46,7 @@ export class ResponseCard {
     this.state.textContent = "…";
     this.waiting = window.setTimeout(() => {
       this.lines = [];
-      this.beside.ask(
+      this.background.ask(
         {
           kind: "response",
           input: d.core,

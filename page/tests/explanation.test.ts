@@ -1,6 +1,6 @@
 import { join } from "node:path";
 import { expect, inject, test } from "vitest";
-import { contact, motor } from "../src/stand_card";
+import { contact, motor } from "../src/stuck_card";
 import { Core } from "../src/core";
 import { coreOf, descriptionOf, expected } from "./browser";
 

@@ -1,6 +1,6 @@
-/** The page's side of its worker. Of each kind the newest task counts; while one runs, only the last of those that wait is kept. */
-import type { Answer, Numbered, Task } from "./beside.worker";
-import BesideWorker from "./beside.worker?worker&inline";
+/** Tasks of the page that a worker computes in the background. Of each kind the newest task counts; while one runs, only the last of those that wait is kept. */
+import type { Answer, Numbered, Task } from "./background.worker";
+import BackgroundWorker from "./background.worker?worker&inline";
 
 type Kind = "run" | "explanation" | "response";
 type Take = (answer: Answer) => void;
@@ -9,7 +9,7 @@ interface Asked {
   take: Take;
 }
 
-export class Beside {
+export class Background {
   private worker?: Worker;
   private number = 0;
   private readonly running = new Map<Kind, { number: number; take: Take }>();
@@ -31,7 +31,7 @@ export class Beside {
   }
 
   private launched(): Worker {
-    const worker = new BesideWorker();
+    const worker = new BackgroundWorker();
     worker.onmessage = ({ data: { number, content } }: MessageEvent<Numbered<Answer>>) => {
       const kind = content.kind === "failure" ? content.of : content.kind;
       const asked = this.running.get(kind);

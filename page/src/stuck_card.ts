@@ -1,6 +1,6 @@
 /** Why does it stand still? What holds each contact at the instant shown, and what would free it. */
-import type { Beside } from "./beside";
-import type { Answer } from "./beside.worker";
+import type { Background } from "./background";
+import type { Answer } from "./background.worker";
 import type { ContactState, Explanation, MotorState, Run } from "./core";
 import type { CoreInput } from "./core_input";
 import type { Description } from "./description";
@@ -11,7 +11,7 @@ import { format, shown, SLIDING, TURNING } from "./units";
 const PATIENCE = 150; // ms between two questions while the instant moves
 const [WIDTH, HEIGHT, SIDE] = [300, 21, 8]; // of a bar, with room at both ends
 
-export class StandCard {
+export class StuckCard {
   private readonly answer = h("p", { class: "answer", "aria-live": "polite" });
   private readonly list = h("ul", { class: "contacts" });
   private input?: CoreInput;
@@ -25,7 +25,7 @@ export class StandCard {
 
   constructor(
     root: HTMLElement,
-    private readonly beside: Beside,
+    private readonly background: Background,
   ) {
     const caption = h("figcaption", {}, h("b", {}, "Why does it stand still?"));
     root.append(h("figure", { class: "stand" }, caption, this.answer, this.list));
@@ -53,7 +53,7 @@ export class StandCard {
     const [input, time] = [this.input, this.time];
     if (!input || time === this.asked) return;
     this.asked = time;
-    this.beside.ask({ kind: "explanation", input, time }, (answer) => this.take(answer));
+    this.background.ask({ kind: "explanation", input, time }, (answer) => this.take(answer));
   }
 
   private take(answer: Answer): void {

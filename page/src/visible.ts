@@ -1,6 +1,6 @@
 /** Draws only what is in the window; the rest when it comes into it. */
 
-export class Seen {
+export class DrawnWhenVisible {
   private late = false;
 
   /** inside: whether it counts as in the window until the browser says. */

@@ -1,7 +1,7 @@
 /** Which contacts are stuck, and which way the others slip, over time. */
 const [ROW, TEXT, BAR, LEFT, RIGHT] = [36, 17, 14, 66, 12];
 
-export class Strip {
+export class ContactStrip {
   readonly canvas = document.createElement("canvas");
 
   constructor(readonly root: HTMLElement) {

@@ -1,4 +1,4 @@
-/** Works out beside the page what would hold it up: long runs, explanations, and responses one point at a time. */
+/** Worker in the background of the page, for what would hold it up: long runs, explanations, and responses one point at a time. */
 import { Core, CoreError, type Explanation, type Run } from "./core";
 import type { CoreInput } from "./core_input";
 import { type Point, respond } from "./response";
