@@ -10,4 +10,4 @@ from .motor_quantities import temperatures as temperatures
 from .pull_out_curves import stepper_curves as stepper_curves
 from .stepper_axis import OpenLoop as OpenLoop
 from .stepper_axis import open_loop as open_loop
-from .warm_up import warm_up as warm_up
+from .warm_up_run import warm_up as warm_up
