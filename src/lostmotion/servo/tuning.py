@@ -32,7 +32,7 @@ from .linear_regimes import Axis, Regime, axis_of, regimes
 from .linear_sampled_loop import LinearLoop
 from .margins import STABLE, bandwidth_of, frequencies, margins
 from .tuning_data import frictions, inertias, lag_sum, two_inertias
-from .tuning_result import Amperes, Tuning, aligned, conventions, differences, load_untuned
+from .tuning_result import Amperes, Tuning, aligned, differences, load_untuned
 
 RULES = (
     "suited",
@@ -72,7 +72,8 @@ def drive_units(scenario: Scenario, motor: str | None = None) -> list[str]:
     K_v = None if position is None else position.gain
     gains = speed.gain, speed.k_i, K_v, time
     slides = axis.train.is_slide(axis.motor_shaft)
-    return aligned(conventions(*gains, _torque_constant(axis), slides, _amperes(axis)))
+    as_found = Tuning("", "", axis.scenario, *gains, _torque_constant(axis), {}, slides, _amperes(axis))
+    return aligned(as_found.conventions())
 
 
 @checked

@@ -22,6 +22,11 @@ from ..units.practical import printed
 
 GAINS = (".speed.gain", ".position.gain")  # ends of their keys, which a file may leave out
 Amperes = Literal["peak", "dc", "of the data sheet"]  # amplitude of a phase, current of an armature, or not known
+CURRENTS: dict[Amperes, str] = {
+    "peak": "current of a phase",
+    "dc": "current of the armature",
+    "of the data sheet": "amperes as in limits.torque_constant",
+}
 
 
 @dataclass(frozen=True)
@@ -60,9 +65,40 @@ class Tuning:
         return self.gain / self.integral_gain if self.integral_gain else math.inf
 
     def conventions(self) -> list[tuple[str, str, str]]:
-        """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so)."""
-        gains = self.gain, self.integral_gain, self.position_gain, self.filter_time
-        return conventions(*gains, self.torque_constant, self.linear_motor, self.amperes)
+        """The same gains as manufacturers of drives write them: (what, value with unit, where it is written so).
+
+        Currents of a winding are in amperes rms of a phase, as data sheets print them, and as amplitudes.
+        """
+        rows: list[tuple[str, str, str]] = []
+
+        def add(value: str, where: str, what: str = "") -> None:
+            rows.append((what, value, where))
+
+        slides, per_minute = self.linear_motor, math.pi / 30.0
+        force, speed = ("N", "(m/s)") if slides else ("N·m", "(rad/s)")
+        of_motor = f"{'force of' if slides else 'torque at'} the motor per speed of the motor"
+        add(f"{self.gain:.5g} {force}/{speed}", of_motor, "speed loop, gain")
+        if not slides:
+            add(f"{self.gain * per_minute:.5g} N·m/rpm", "the same per revolution in a minute")
+        if (constant := self.torque_constant) is not None:
+            amps, unit = self.gain / constant, "A"
+            if self.amperes == "peak":
+                add(f"{amps:.5g} A peak/{speed}", f"amplitude of a phase, with {constant:.4g} {force}/A peak")
+                amps, constant, unit = amps / math.sqrt(2.0), constant * math.sqrt(2.0), "A rms"
+            add(f"{amps:.5g} {unit}/{speed}", f"{CURRENTS[self.amperes]}, with {constant:.4g} {force}/{unit}")
+            if not slides:
+                add(f"{1e3 * amps * per_minute:.5g} m{unit}/rpm", "the same per revolution in a minute")
+        if self.integral_gain:
+            time = self.gain / self.integral_gain
+            add(f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N", "speed loop, integral time")
+            add(f"{1.0 / time:.5g} 1/s", "its inverse")
+            add(f"{self.integral_gain:.5g} {'N/m' if slides else 'N·m/rad'}", "parallel form, K_i")
+        if self.filter_time:
+            add(f"{1e3 * self.filter_time:.5g} ms", "time constant", "filter of the speed reference")
+        if (K_v := self.position_gain) is not None:
+            add(f"{K_v:.5g} 1/s", "K_v", "position loop, gain")
+            add(f"{0.06 * K_v:.5g} (m/min)/mm", "K_v of linear axes: 1/s times 0.06")
+        return rows
 
     def changes(self) -> list[tuple[str, str, str]]:
         """Changes by the tuning: (key of the scenario, old value, new value), with units.
@@ -155,55 +191,6 @@ def missing_gains(error: InputError) -> list[str]:
 
 def _lacks(reason: str, gain: str) -> bool:
     return reason.startswith(f"lacks {gain.split('.')[1]}, ")
-
-
-def conventions(
-    gain: float,
-    integral_gain: float,
-    K_v: float | None,
-    filter_time: float,
-    torque_constant: float | None,
-    linear_motor: bool = False,
-    amperes: Amperes = "of the data sheet",
-) -> list[tuple[str, str, str]]:
-    """Gains in the words of manufacturers: (what, value with unit, where it is written so). Currents of a winding are in amperes rms of a
-    phase, as data sheets print them, and as amplitudes."""
-    if linear_motor:
-        rows = [("speed loop, gain", f"{gain:.5g} N/(m/s)", "force of the motor per speed of the motor")]
-    else:
-        rows = [("speed loop, gain", f"{gain:.5g} N·m/(rad/s)", "torque at the motor per speed of the motor")]
-        rows.append(("", f"{gain * math.pi / 30.0:.5g} N·m/rpm", "the same per revolution in a minute"))
-    if torque_constant is not None:
-        amps, force, speed = (
-            gain / torque_constant,
-            "N" if linear_motor else "N·m",
-            "(m/s)" if linear_motor else "(rad/s)",
-        )
-        unit = "A"
-        if amperes == "peak":
-            rows.append(
-                ("", f"{amps:.5g} A peak/{speed}", f"amplitude of a phase, with {torque_constant:.4g} {force}/A peak")
-            )
-            amps, torque_constant, unit = amps / math.sqrt(2.0), torque_constant * math.sqrt(2.0), "A rms"
-        named = {
-            "peak": "current of a phase",
-            "dc": "current of the armature",
-            "of the data sheet": "amperes as in limits.torque_constant",
-        }
-        rows.append(("", f"{amps:.5g} {unit}/{speed}", f"{named[amperes]}, with {torque_constant:.4g} {force}/{unit}"))
-        if not linear_motor:
-            rows.append(("", f"{1e3 * amps * math.pi / 30.0:.5g} m{unit}/rpm", "the same per revolution in a minute"))
-    if integral_gain:
-        time = gain / integral_gain
-        rows.append(("speed loop, integral time", f"{1e3 * time:.5g} ms", "K_p/K_i, reset time T_N"))
-        rows.append(("", f"{1.0 / time:.5g} 1/s", "its inverse"))
-        rows.append(("", f"{integral_gain:.5g} {'N/m' if linear_motor else 'N·m/rad'}", "parallel form, K_i"))
-    if filter_time:
-        rows.append(("filter of the speed reference", f"{1e3 * filter_time:.5g} ms", "time constant"))
-    if K_v is not None:
-        rows.append(("position loop, gain", f"{K_v:.5g} 1/s", "K_v"))
-        rows.append(("", f"{0.06 * K_v:.5g} (m/min)/mm", "K_v of linear axes: 1/s times 0.06"))
-    return rows
 
 
 def aligned(rows: list[tuple[str, str, str]]) -> list[str]:
