@@ -17,7 +17,7 @@ from ..model.screw import RatedScrew
 from ..units.practical import ROUNDING, RPM, excess, share_of_limit, told_apart
 from .belt_ratings import FULL_MESH, INCH, SOURCE, of_profile, tooth_shares, widths, working_tension
 from .catalogue_formulas import belt_force, buckling_force, compression_force, critical_speed, dn_speed, tooth_forces
-from .finding import Finding, Judgement, within
+from .finding import Finding, Judgement, not_judged, within
 from .life import HOUR, AxialLoad, axial_load, life_of_gearbox, screw_life
 from .linear_stage_demands import Stage
 from .required_motion import InputDemand, RequiredMotion
@@ -42,7 +42,7 @@ def least(rule: str, what: str, value: float, wanted: float, unit: str, name: st
 
 def missing(rule: str, what: str, key: str) -> Finding:
     """A rule that cannot be judged."""
-    return Finding(rule, what, "not judged", "unknown", f"{key} is missing")
+    return not_judged(rule, f"{key} is missing", what)
 
 
 def against(rule: str, what: str, value: float, limit: float | None, unit: str, name: str, key: str) -> Finding:
@@ -130,8 +130,7 @@ def _buckling(screw: RatedScrew) -> float:
 
 def without_part(rule: str, part: str, key: str) -> Finding:
     """A demand of a task that nothing of a candidate can be compared with."""
-    remark = f"the candidate has no {part}, which {key} is of; leave it out, or judge it apart"
-    return Finding(rule, rule.replace("_", " "), "not judged", "unknown", remark)
+    return not_judged(rule, f"the candidate has no {part}, which {key} is of; leave it out, or judge it apart")
 
 
 def holding_brake(demand: InputDemand, brake: HoldingBrake | None, slide: RequiredMotion | None = None) -> Finding:

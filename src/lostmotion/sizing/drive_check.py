@@ -18,7 +18,7 @@ from ..simulation.scenario.requirements import need_no_impacts
 from ..simulation.scenario.scenario import Scenario
 from .axis_rules import belt_rules, missing, rack_rules, screw_rules
 from .duty_cycle import MIN_REST, STANDSTILL, DutyCycle, duty_cycle
-from .finding import Finding, Findings
+from .finding import Finding, Findings, not_judged
 from .gearbox_check import input_speeds, loads, locks, loss_map
 from .life import HOUR, AxialLoad, screw_life
 from .motion_check import end_stop, resonances
@@ -113,7 +113,7 @@ def _amplifier(scenario: Scenario, result: RunArrays) -> list[Finding]:
         return []
     if len(train.motors) != 1:
         remark = f"one amplifier feeds one motor, and this train has {len(train.motors)}; check each axis on its own"
-        return [Finding("amplifier_current", "amplifier", "not judged", "unknown", remark)]
+        return [not_judged("amplifier_current", remark, "amplifier")]
     ((name, motor),) = train.motors.items()
     torque, speed = result[train.variable(name, "torque")], result[train.variable(motor.shaft, "speed")]
     oriented = oriented_amplitudes(scenario, result, name)

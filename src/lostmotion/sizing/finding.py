@@ -163,6 +163,11 @@ class Findings(tuple[Finding, ...]):
         return Verdict.of(points, lines)
 
 
+def not_judged(rule: str, why: str, what: str = "") -> Finding:
+    """A rule that is not judged, with the reason; `what` is the name of the rule if left out."""
+    return Finding(rule, what or rule.replace("_", " "), "not judged", "unknown", why)
+
+
 def within(
     rule: str,
     what: str,

@@ -12,7 +12,7 @@ from ..model.motor import Motor, MotorLimits
 from ..units.practical import ROUNDING, RPM, told_apart
 from .catalogue_formulas import WARM
 from .duty_cycle import DutyCycle
-from .finding import Finding, Judgement, within
+from .finding import Finding, Judgement, not_judged, within
 from .winding_temperature import TwoBodies, mean_square, steady_rise
 
 WHOLE = ", that heats as the whole current"
@@ -104,7 +104,7 @@ def heat(
             return findings
         lacks = f"{where}.limits.max_winding_temperature is" if permissible is None else "its resistances are"
         remark = f"{lacks} missing, and ratings hold up to {WARM:.0f} °C, not at {ambient:.3g} °C"
-        return [*findings, Finding("winding_temperature", what, "not judged", "unknown", remark)]
+        return [*findings, not_judged("winding_temperature", remark)]
     if math.isinf(rise):
         remark = "the current is far too large to last"
         return [

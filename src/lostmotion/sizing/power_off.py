@@ -10,9 +10,9 @@ from ..simulation.runs.results import RunArrays
 from ..simulation.scenario.scenario import Scenario
 from ..test_rig.virtual_rig import TestRig
 from .axis_rules import BRAKE, SLIDE_BRAKE, against, brake_of_a_run, held_by
-from .finding import Finding
+from .finding import Finding, not_judged
 from .holding import holding
-from .rules_of_one_axis import depends_on_angles, not_judged
+from .rules_of_one_axis import depends_on_angles
 
 HOLDING = "holding with command 0"
 

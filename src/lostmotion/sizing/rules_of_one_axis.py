@@ -6,7 +6,7 @@ from ..simulation.runs.results import RunArrays
 from ..simulation.runs.stuck_contacts import smallest_commands
 from ..simulation.scenario.one_axis import OneAxis, tied_together
 from ..simulation.scenario.scenario import Scenario
-from .finding import Finding
+from .finding import Finding, not_judged
 from .gearbox_check import lost_motion
 from .motion_check import inertia_ratio, resonance
 
@@ -40,11 +40,6 @@ def _inertias(scenario: Scenario) -> Finding:
     of_gears = (gear.inertia * (turns(train, gear.input, motor.shaft) or 0.0) ** 2 for gear in train.gears.values())
     key = scenario.motor_key(name)
     return inertia_ratio(motor, DIRECT, sum(of_shafts) + sum(of_gears), key=key)
-
-
-def not_judged(rule: str, why: str) -> Finding:
-    """A rule that a train gives no answer to."""
-    return Finding(rule, rule.replace("_", " "), "not judged", "unknown", why)
 
 
 def depends_on_angles(scenario: Scenario) -> bool:

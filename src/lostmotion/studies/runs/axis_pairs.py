@@ -36,7 +36,7 @@ from ...sizing.axis_task.cycle_demands import COLUMNS, Repeated, columns_of_gear
 from ...sizing.axis_task.mass_and_price import CHOICE, lacks, value_of
 from ...sizing.axis_task.mass_and_price import judged as judged_choice
 from ...sizing.catalogue_formulas import derating
-from ...sizing.finding import Finding
+from ...sizing.finding import Finding, not_judged
 from ...sizing.gearbox_check import input_speeds, loads, lost_motion
 from ...sizing.linear_stage_demands import Stage, at_input, together
 from ...sizing.motion_check import ratio_of_inertias
@@ -363,7 +363,7 @@ class Axes:
             if self.over(whole):
                 whole["why"] = "; ".join(filter(None, [why, str(whole["why"])]))
             else:  # friction may hold what the loop would swing
-                whole = columns_of([*found, Finding("stability", "loops", "not judged", "unknown", why)], CHECKS) | more
+                whole = columns_of([*found, not_judged("stability", why, "loops")], CHECKS) | more
         return whole, int(made.result.attrs["switching_count"])
 
     def _after_run(self, row: np.ndarray, made: Repeated, winding: float) -> list[Finding]:
