@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..model.losses import LossMap
-from ..reports.figure_style import FAINT, LEVEL, STYLES, step
+from ..reports.figure_style import FAINT, LEVEL, STYLES, dots, step
 from ..reports.panels import Chart, Curve, Drawing, Ground, Panel, scientific
 from ..reports.written_files import panels_csv, table_csv
 from ..response.crossovers import THREE_DECIBELS
@@ -175,7 +175,7 @@ def _stiffness_spec(results: Results) -> FigureSpec:
     twist, torque = results.first_loading
     chords = np.diff(torque) / np.diff(twist)
     within, ends = twist[[0, -1]], np.array([spring.torque(d) for d in breaks])  # type: ignore[union-attr]
-    points = {"color": STYLES["2-DOF-NL"]["color"], "linestyle": "none", "marker": "o", "markersize": 5}
+    points = dots(STYLES["2-DOF-NL"]["color"], 5)
     return FigureSpec(
         "07",
         "Torsional stiffness",

@@ -29,17 +29,16 @@ FIRST, SECOND, THIRD, FOURTH = LOOKS
 FAINT: dict[str, Any] = {"color": MUTED, "linestyle": ":", "linewidth": 1.3}  # a command, or a curve to compare with
 LEVEL: dict[str, Any] = {"color": MUTED, "linestyle": "-", "linewidth": 0.8}  # a limit or a level
 MEASURED: dict[str, Any] = {"color": MUTED, "linestyle": "-", "linewidth": 1.3}
-DOTS: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "none", "marker": "o", "markersize": 7}
-POINTS: dict[str, Any] = {
-    "color": INK,
-    "linestyle": "none",
-    "marker": "o",
-    "markersize": 4.5,
-    "markerfacecolor": "none",
-}
-"""values of a second method over a line"""
-OTHERS: dict[str, Any] = {"color": MUTED, "linestyle": "none", "marker": "x", "markersize": 4, "alpha": 0.6}
-"""points that are shown beside the ones that matter"""
+
+
+def dots(color: str, size: float, marker: str = "o", **more: Any) -> dict[str, Any]:
+    """Style of points without a line."""
+    return {"color": color, "linestyle": "none", "marker": marker, "markersize": size, **more}
+
+
+DOTS = dots(PALETTE["second"], 7)
+POINTS = dots(INK, 4.5, markerfacecolor="none")  # values of a second method over a line
+OTHERS = dots(MUTED, 4, "x", alpha=0.6)  # points that are shown beside the ones that matter
 # The models of the paper.
 STYLES: dict[str, dict[str, Any]] = {
     "2-DOF-NL": {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.7},

@@ -4,7 +4,6 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -20,12 +19,12 @@ from ..model.train import DriveTrain
 from ..simulation.scenario.scenario import Scenario
 from ..units.conversion import si_factor
 from ..units.practical import ARCMIN, printed
-from .figure_style import FAINT, MEASURED, PALETTE, look
+from .figure_style import FAINT, MEASURED, PALETTE, dots, look
 from .page import Prose, Report, Table
 from .panels import Curve, Group, Matrix, Panel
 from .written_files import table_csv, write_report, write_text
 
-CLOUD: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 1.6, "alpha": 0.4}
+CLOUD = dots(PALETTE["first"], 1.6, alpha=0.4)
 FIRST = 4  # overlays before the tables
 PER_FIGURE = 24  # overlays
 ALL = 12  # logs, up to which all are drawn

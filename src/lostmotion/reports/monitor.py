@@ -10,13 +10,12 @@ from ..identification.monitor.trends import RESIDUAL, Watched
 from ..identification.task.free_parameters import in_unit
 from ..units.conversion import si_factor
 from ..units.practical import printed
-from .figure_style import FAINT, PALETTE
+from .figure_style import FAINT, PALETTE, dots
 from .page import Prose, Report, Table
 from .panels import Curve, Group, Panel
 from .written_files import table_csv
 
-VALUES: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5.0}
-BEGIN: dict[str, Any] = VALUES | {"color": PALETTE["second"], "markersize": 9.0}
+VALUES, BEGIN = dots(PALETTE["first"], 5.0), dots(PALETTE["second"], 9.0)
 INTERVAL: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.2, "alpha": 0.6}
 LIMIT: dict[str, Any] = {"color": PALETTE["second"], "linestyle": "--", "linewidth": 1.5}
 EVIDENCE: dict[str, Any] = {"color": PALETTE["first"], "linestyle": "-", "linewidth": 1.6}

@@ -15,7 +15,7 @@ from ..studies.study.study_definition import Study
 from ..studies.study.vary import Vary
 from ..units.practical import counted, printed
 from ..verdict import Verdict
-from .figure_style import PALETTE
+from .figure_style import PALETTE, dots
 from .page import Prose, Report, Table
 from .panels import Bars, Curve, Group, Histogram, Panel
 from .study_selection import SelectionReport, shown_in, words
@@ -27,13 +27,7 @@ if TYPE_CHECKING:
 BLANK = "Over all runs. A blank cell means that no run has a value."
 MAX_POINTS = 5000  # of a scatter
 NAMES = 12  # along an axis
-POINTS: dict[str, Any] = {
-    "color": PALETTE["first"],
-    "linestyle": "none",
-    "marker": "o",
-    "markersize": 2.5,
-    "alpha": 0.5,
-}
+POINTS = dots(PALETTE["first"], 2.5, alpha=0.5)
 
 
 def statistics(table: pa.Table, study: Study, *, page: bool | None = None) -> list[list[Any]]:

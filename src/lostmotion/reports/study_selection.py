@@ -18,7 +18,7 @@ from ..studies.study.select_table import TASK_SHARES, USE
 from ..studies.study.study_definition import Study
 from ..units.practical import PRACTICAL, counted, printed
 from ..verdict import Point, Verdict
-from .figure_style import OTHERS, PALETTE, look
+from .figure_style import OTHERS, PALETTE, dots, look
 from .page import Table
 from .panels import Curve, Group, Panel
 from .written_files import table_csv
@@ -272,11 +272,10 @@ class SelectionReport:
             across, along = (factor * np.array([c.values[name] for c in found]) for name, (_, factor) in shown.items())
             return Curve(label, across, along, style, names=tuple(c.name for c in found), **more)
 
-        dots = {"color": PALETTE["first"], "linestyle": "none", "marker": "o", "markersize": 5}
         line = look(1) | {"marker": "o", "markersize": 6}
         curves = (
             curve("does not fit", [c for c in self.ranked if not c.fits], OTHERS),
-            curve("fits", self.fitting, dots),
+            curve("fits", self.fitting, dots(PALETTE["first"], 5)),
             curve("Pareto front", self.front, line, numbered=len(self.front) <= MAX_ROWS),
         )
         across, along = (self._better(title, name) for name, (title, _) in shown.items())
