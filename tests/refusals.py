@@ -17,9 +17,9 @@ def assert_plain(message: str) -> None:
     assert not re.search(r"Input should|https?:|pydantic|\b(tuple|dict|float|int|str|bool|NoneType|model)\b|[TF]alse|True", message)
 
 
-def refused(make: Callable[[], object], *keys: str, match: str = "") -> str:
-    """The one line by which something is refused, for the values with these keys and with a text that matches, where they are given."""
-    with refuses(*keys, match=match) as told:
+def refused(make: Callable[[], object], *keys: str, reason: str = "", match: str = "") -> str:
+    """The one line by which something is refused: by these keys and with this reason as data, or with a text that matches."""
+    with refuses(*keys, reason=reason, match=match) as told:
         make()
     return told[0]
 
@@ -35,14 +35,15 @@ def assert_file_refused(path: Path, text: str, old: str, new: str, words: list[s
 
 
 @contextmanager
-def refuses(*keys: str, match: str = "") -> Iterator[list[str]]:
-    """What is within is refused in one line, with these keys as data of the error and a text that matches, where they are given."""
+def refuses(*keys: str, reason: str = "", match: str = "") -> Iterator[list[str]]:
+    """What is within is refused in one line, as by `refused`."""
     told: list[str] = []
     with pytest.raises(lm.InputError) as caught:
         yield told
     told.append(str(caught.value))
     assert "\n" not in told[0]
     assert not keys or [problem.keys for problem in caught.value.problems if problem.keys] == [keys], told[0]
+    assert any(reason in problem.reason for problem in caught.value.problems), f"{told[0]} lacks {reason}"
     assert re.search(match, told[0]), f"{told[0]} lacks {match}"
 
 

@@ -436,7 +436,7 @@ def test_given_references_are_inputs(library: c.CDLL) -> None:  # noqa: F811
     assert "has to know the past of its reference" in described.error()
     own = {"law": True, "sample_time": 1e-3, "reference": {"kind": "torque"}, "encoder": {"ideal": True}}
     law = lm.load("speed-axis").replace(controller=own)
-    refused(lambda: lm.portable.description(law), match="controller of motor: has a law of your own")
+    refused(lambda: lm.portable.description(law), reason="controller of motor: has a law of your own")
 
 
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "two-motors-one-ring"])

@@ -336,7 +336,7 @@ def test_a_result_of_an_axis_has_the_tables_of_its_file(tmp_path: Path) -> None:
     again = lm.simulation.scenario_of(lm.open_result(tmp_path / "run.nc"))
     assert again == axis
     assert again.form == axis.form
-    refused(lambda: lm.sizing.motor_current(lm.open_result(tmp_path / "run.nc")), match=r"axis\.motor\.limits\.torque_constant")
+    refused(lambda: lm.sizing.motor_current(lm.open_result(tmp_path / "run.nc")), reason="axis.motor.limits.torque_constant")
     refused(lambda: axis.replace(**{"slides.slide.mass": -1.0}), "axis.slide.mass")
     more = axis.replace(**{"shafts.motor.inertia": 1e-4})  # which a file of an axis cannot say
     assert lm.Scenario.from_json(more.to_json()).tables == more.tables

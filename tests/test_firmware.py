@@ -239,4 +239,4 @@ def test_bad_firmware_is_refused(make: Any, firmware: dict[str, Any], changes: d
 
 
 def test_no_gains_are_found_for_a_duty_cycle() -> None:
-    refused(lambda: lm.commission(axis(sampled(SERVO))), match="duty cycle is not linear")
+    refused(lambda: lm.commission(axis(sampled(SERVO))), reason="duty cycle is not linear")

@@ -428,7 +428,7 @@ def test_a_train_alone_takes_the_given_shafts_by_name_and_a_step_their_motions()
     assert simulation.given == ("load",)
     simulation.advance(0.1, motion={"load": {"speed": 2.0}})
     assert simulation["load_speed"] == 2.0
-    refused(lambda: lm.Simulation(train, given=["cranc"]), match='given: "cranc" is no shaft of this train')
+    refused(lambda: lm.Simulation(train, given=["cranc"]), reason='given: "cranc" is no shaft of this train')
     simulation = lm.Simulation(scenario())
     for motion, says in (
         (None, "motion.crank: is missing; give at least its speed"),

@@ -155,7 +155,7 @@ def test_messages_of_an_mcap_file_are_channels_at_the_times_of_one_topic(tmp_pat
     assert log.header == {"mass": 0.5, "unit": "left"}
     assert any("servo/goal" in note for note in log.notes)
     assert read_log(path, time="/servo/goal").time == pytest.approx(TIME[::4], abs=1e-9)
-    refused(lambda: read_log(path, time="servo/stat"), match="has no topic servo/stat; its topics are servo/state, servo/goal")
+    refused(lambda: read_log(path, time="servo/stat"), reason="has no topic servo/stat; its topics are servo/state, servo/goal")
     stamps = r"message 1 has no header.stamp .* give logs.time = 'servo/goal'"
     refused(lambda: read_log(path, time="/servo/goal.header.stamp"), match=stamps)
 
@@ -163,11 +163,11 @@ def test_messages_of_an_mcap_file_are_channels_at_the_times_of_one_topic(tmp_pat
 def test_an_mcap_file_that_is_neither_in_json_nor_of_ros_is_refused_in_one_line(tmp_path: Path) -> None:
     path = tmp_path / "log.mcap"
     as_mcap(path, "protobuf")
-    refused(lambda: read_log(path), match=r"has no topic in JSON or of ROS \(protobuf\); record in one of these")
+    refused(lambda: read_log(path), reason="has no topic in JSON or of ROS (protobuf); record in one of these")
     as_mcap(path)
     for content in (path.read_bytes()[:-300], path.read_bytes()[:300], b"something else"):
         path.write_bytes(content)
-        refused(lambda: read_log(path), match="is not an MCAP file that mcap reads")
+        refused(lambda: read_log(path), reason="is not an MCAP file that mcap reads")
 
 
 JOINT = "std_msgs/Header header\nfloat64[] position\nbool enabled\nstring name\nuint8[] image\n"
@@ -270,7 +270,7 @@ def test_damaged_messages_of_ros_are_refused_in_one_line(tmp_path: Path) -> None
         refused(lambda: read_log(path), match=said)
     for name, content in (("log.bag", b"something else"), ("log.db3", b"something else"), ("log.bag", b"")):
         (tmp_path / name).write_bytes(content)
-        refused(lambda name=name: read_log(tmp_path / name), match="is not a bag that rosbags reads")
+        refused(lambda name=name: read_log(tmp_path / name), reason="is not a bag that rosbags reads")
 
 
 def test_fields_and_matrices_of_hdf5_are_channels(tmp_path: Path) -> None:

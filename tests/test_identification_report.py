@@ -292,7 +292,7 @@ def test_no_length_is_fitted_to_an_angle_without_a_factor(tmp_path: Path, variab
         if name == unit:
             assert list(prepared(task, log, rig.units).measured) == ["x"]
             continue
-        with refuses(match="give a scale that turns one into the other, such as a radius"):
+        with refuses(reason="give a scale that turns one into the other, such as a radius"):
             prepared(task, log, rig.units)
         data["measured"] = {"x": {"channel": "x", "variable": variable, "scale": 0.1}}
         assert prepared(lm.identification.Identification(**data), log, rig.units).measured

@@ -95,10 +95,7 @@ def test_moves_of_a_reference_can_be_changed() -> None:
 def test_without_a_built_page_the_remedy_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(live_page, "TEMPLATE", tmp_path / "page.html")
     monkeypatch.setattr(live_page, "made_here", lambda *_: None)  # as in an installed package
-    refused(
-        lambda: lm.live(lm.load("paper-2dof-nl-small", SHORT), height=500),
-        match=r"page\.html: is missing.*run `make page`, which needs node",
-    )
+    refused(lambda: lm.live(lm.load("paper-2dof-nl-small", SHORT), height=500), reason="run `make page`, which needs node")
 
 
 def sliders(scenario: lm.Scenario) -> dict[str, dict]:  # type: ignore[type-arg]

@@ -233,7 +233,7 @@ def test_what_would_count_twice_is_refused_or_replaced() -> None:
 def test_data_that_was_changed_is_noticed() -> None:
     arm = robot(1e-3, drive())
     arm.data.qpos[1] = 0.3
-    refused(arm.step, match=r"joint 'elbow': data has it at 0\.3 rad, .*call follow\(\)")
+    refused(arm.step, reason="joint 'elbow': data has it at 0.3 rad, ")
     arm.follow()
     arm.step()
     assert "must be 2 finite numbers, for shoulder, elbow" in refused(lambda: arm.step([1.0]))
@@ -314,7 +314,7 @@ def test_a_screw_axis_is_described_by_mass_and_forces_at_its_slide() -> None:
     assert found.frictionloss == pytest.approx(0.05 * ratio + 20.0, rel=1e-2)
     assert '<joint name="table" type="slide" armature' in found.mjcf("table")
     assert 'type="prismatic"' in found.urdf("table")
-    refused(lambda: lm.mujoco.reduce(lm.Scenario(**SCREW), "10 deg", 1.0), match="amplitude")
+    refused(lambda: lm.mujoco.reduce(lm.Scenario(**SCREW), "10 deg", 1.0), reason="amplitude")
 
 
 def test_what_a_reduction_costs_is_stated_and_no_load_torque_of_a_scenario_is_dropped_from_it() -> None:
@@ -327,7 +327,7 @@ def test_what_a_reduction_costs_is_stated_and_no_load_torque_of_a_scenario_is_dr
     assert lm.mujoco.reduce(loaded, 0.5, 1.0, load_torque=0.0) == lm.mujoco.reduce(joint, 0.5, 1.0)
     # The motion ends near where it begins, so that the end alone does not show that the joint stood still.
     locked = joint.replace(**{"load.friction_torque": 1e5})
-    refused(lambda: lm.mujoco.reduce(locked, 0.5, 1.0), match="does not follow the motion")
+    refused(lambda: lm.mujoco.reduce(locked, 0.5, 1.0), reason="does not follow the motion")
     for ratio, words in ({}, "has no actuator that says the gear; give"), ({"ratio": 100.0}, "has no armature"):
         refused(lambda given=ratio: lm.mujoco.from_mjcf(arm_model(1e-3), "elbow", **given), match=f"joint 'elbow': {words}")
 

@@ -214,7 +214,7 @@ def test_other_actuators_are_refused_by_name() -> None:
         assert re.fullmatch(key, caught.value.problems[0].keys[0])
     made = spec("motor")
     made.add_actuator(name="other", target="arm", trntype=mujoco.mjtTrn.mjTRN_JOINT)
-    refused(lambda: lm.mujoco.from_mjcf(made, "arm"), match="has the actuator 'servo' and the actuator 'other'; leave one of them")
+    refused(lambda: lm.mujoco.from_mjcf(made, "arm"), reason="has the actuator 'servo' and the actuator 'other'; leave one of them")
     model = spec("motor").compile()
     model.opt.disableactuator = 1
     refused(lambda: lm.mujoco.from_mjcf(model, "arm"), "disableactuator")

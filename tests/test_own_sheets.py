@@ -105,8 +105,8 @@ def test_one_list_takes_names_files_directories_and_filters(sheets: Path):
 
 def test_a_scenario_names_one_of_several_records(sheets: Path):
     assert lm.motor(f"{sheets / 'both.toml'}#m-two").rotor_inertia == pytest.approx(1.1e-4)
-    refused(lambda: lm.motor(str(sheets / "both.toml")), match=r"both.toml#m-one")
-    refused(lambda: lm.motor(f"{sheets / 'both.toml'}#m-three"), match="m-three")
+    refused(lambda: lm.motor(str(sheets / "both.toml")), reason="both.toml#m-one")
+    refused(lambda: lm.motor(f"{sheets / 'both.toml'}#m-three"), reason="m-three")
 
 
 @pytest.mark.parametrize(("given", "says"), [
@@ -199,7 +199,7 @@ def test_a_torque_source_has_the_lag_of_a_current_loop_and_no_electrical_energy(
     wrong = {"controller": TABLES["controller"] | {"current": {"kind": "field_oriented"}}, "candidates": {"motor": "maxon-ec-i-52-606793"}}
     both = {key: value for key, value in TABLES.items() if key not in ("vary", "motor")} | wrong
     task = task_of({**both, "gearbox": "schaeffler-rt1-h-20-100"})
-    refused(lambda: Axes(task).judged(task.parameters(0, 1)[0]), match="field_oriented")
+    refused(lambda: Axes(task).judged(task.parameters(0, 1)[0]), "controller.current.kind", reason="field_oriented")
 
 
 EFFICIENCY = 0.6

@@ -129,7 +129,7 @@ def test_what_does_not_fit_is_refused(change: dict[str, Any], said: str) -> None
 def test_a_target_and_moves_are_two_things() -> None:
     refused(
         lambda: lm.PositionReference(target=FLY_BY | {"axis": "traverse"}, moves=[{"to": 1.0}], speed=1.0, acceleration=1.0),
-        match="target and moves",
+        reason="target and moves",
     )
 
 

@@ -107,7 +107,7 @@ def test_a_csv_file_that_is_cut_at_the_end_of_a_line_is_refused(result: xr.Datas
     ):
         (tmp_path / "cut.csv").write_text("".join(content))
         refused(lambda: lm.open_result(tmp_path / "cut.csv"), match=words)
-    refused(lambda: lm.switchings_of(xr.Dataset()), match="has no switchings; give a result of simulate")
+    refused(lambda: lm.switchings_of(xr.Dataset()), reason="has no switchings; give a result of simulate")
 
 
 def test_energy_balance_closes_to_rounding(result: xr.Dataset) -> None:

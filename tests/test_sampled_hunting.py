@@ -204,7 +204,7 @@ def test_losses_that_grow_with_the_load_alone_are_no_constant_friction() -> None
     assert certificate.verdict == "not decided"
     assert "motor_contact grows with the load alone" in certificate.reason
     several = lm.load("direction-finder")
-    refused(lambda: lm.hunting_certificate(several), match="motor: there are several controllers")
+    refused(lambda: lm.hunting_certificate(several), "motor", reason="there are several controllers")
     assert {lm.hunting_certificate(several, motor=motor).verdict for motor in several.axes()} == {"not decided"}
     report = lm.commission(rotor(3.0, 1e-5, **{"simulation/duration": 2.0}))
     assert report.certificate.verdict == "hunts"

@@ -195,15 +195,15 @@ def test_bad_steps_are_refused_and_change_nothing():
         for call in (lambda h=interval: lm.Simulation(drive, step=h), lambda h=interval: simulation.advance(h, command=0.1)):
             refused(call, match=r"must lie between 1e-12 s and 1e\+12 s|must be a finite number")
     for inputs in ({"command": math.nan}, {"command": 0.1, "load_torque": math.inf}):
-        refused(lambda inputs=inputs: simulation.advance(1e-3, **inputs), match="must be a finite number")
+        refused(lambda inputs=inputs: simulation.advance(1e-3, **inputs), reason="must be a finite number")
     assert simulation.state == before
     simulation.advance(1e6, command=0.0)
-    refused(lambda: simulation.advance(1e-12, command=0.1), match="below the resolution of the time")
+    refused(lambda: simulation.advance(1e-12, command=0.1), reason="below the resolution of the time")
 
 
 def test_samples_that_do_not_fit_into_memory_are_refused_before_the_run(monkeypatch):
     monkeypatch.setattr("lostmotion.inputs.memory_limits.free_memory", lambda: 5_000_000_000)
-    with refuses(match=r"1e\+08 samples need 18\.3 GB of memory, and 5 GB are free"):
+    with refuses(reason="1e+08 samples need 18.3 GB of memory, and 5 GB are free"):
         lm.simulate(lm.load("paper-2dof-nl-small"), duration=100.0, sample_interval=1.0000001e-6)
 
 

@@ -109,7 +109,7 @@ def test_the_error_of_an_encoder_is_found_in_the_following_error() -> None:
 
 def test_what_has_no_spectrum_is_refused() -> None:
     pair = {"pair": gear("motor", "load", 1.0, sine(3, ARCMIN))}
-    refused(lambda: lm.spectrum(turning(pair, 4.0)), match=r"start: the motor makes 0\.318 revolutions .* a whole one is needed")
+    refused(lambda: lm.spectrum(turning(pair, 4.0)), reason="start: the motor makes 0.318 revolutions ")
     assert "the speed of motor is not constant from 1 s to 2 s" in refused(lambda: lm.spectrum(lm.load("paper-2dof-nl-small")))
     assert 'against: "load" is not known' in refused(lambda: lm.spectrum(turning(pair, 20.0), against="load"))
     assert "this axis follows no position reference" in refused(lambda: lm.spectrum(turning(pair, 20.0), against="reference"))

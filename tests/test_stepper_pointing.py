@@ -237,8 +237,8 @@ def test_what_a_record_of_a_stepper_lacks_is_said_and_given_beside_it():
 def test_a_misspelt_number_of_steps_points_to_its_key(key: str):
     refused(lambda: lm.Motor(kind="stepper", rotor_inertia=1e-6, holding_torque=0.1, **{key: 48}), key)
     rated = {"rated_voltage": 24.0, "kind": "brushless", "holding_torque": 1.0}
-    refused(lambda: lm.data_sheets.MotorSheet(name="m", **rated), match="holding_torque")
-    refused(lambda: lm.data_sheets.MotorSheet(name="m", kind="stepper", rated_torque=1.0), match="rated_torque")
+    refused(lambda: lm.data_sheets.MotorSheet(name="m", **rated), reason="holding_torque")
+    refused(lambda: lm.data_sheets.MotorSheet(name="m", kind="stepper", rated_torque=1.0), reason="rated_torque")
 
 
 TASK = """

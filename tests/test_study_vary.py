@@ -221,7 +221,7 @@ test_what_cannot_vary_ends_in_one_clear_line = refusals_of(
 
 def test_a_record_varied_twice_is_refused(tmp_path: Path):
     one, other = (f'key = "{k}"; values = ["{GEARBOXES[0]}"]' for k in ("gearbox", "gearbox.from"))
-    refused(lambda: lm.studies.load_study(write(tmp_path, one, other)), match="which are the same")
+    refused(lambda: lm.studies.load_study(write(tmp_path, one, other)), reason="which are the same")
 
 
 def test_a_study_made_in_python_varies_records_as_well(tmp_path: Path):
@@ -400,7 +400,7 @@ def test_a_study_file_with_such_an_expression_is_refused_as_a_whole(tmp_path: Pa
     study = f'base = "{ROOT}/scenarios/paper-2dof-nl-large.toml"\ndesign = "list"\nvary = [{{ key = "load.inertia", values = [1, 2] }}]\n'
     path = tmp_path / "s.toml"
     path.write_text(study + '[keep]\ngood = "peak(load_speed)"\nbad = "load_speed.to_netcdf(\'f\')"\n')
-    refused(lambda: lm.studies.load_study(path), match=r"s\.toml: .*keep\.bad: .*must not use \.to_netcdf; the methods are mean")
+    refused(lambda: lm.studies.load_study(path), reason="must not use .to_netcdf; the methods are mean")
     assert os.listdir() == ["s.toml"]
     vary: list = [{"key": "load.inertia", "values": [1]}]
     with pytest.raises(ValueError, match="must not use"):
