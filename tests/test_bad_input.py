@@ -21,12 +21,13 @@ from refusals import assert_file_refused, assert_plain, refusals_of, refused
 from tables import MOTOR
 
 GOOD = (
-    MOTOR
-    + """
+    """
 [command]
 amplitude = 1.0
 frequency = 1.0
-
+"""
+    + MOTOR
+    + """
 [gearbox]
 ratio = 90
 inertia = 6.7e-6
