@@ -29,8 +29,8 @@ class LockedTorques {
     // Each torque is as it was or at a bound in a regime, which is that at rest or, where contacts have come to their
     // limits and turn back at once, that at the limits, which gives the other torques.
     struct Hold {
-        std::shared_ptr<const Regime> at_limit;  // empty: the regime at rest itself
-        std::vector<model::Bound> bounds;        // in the order of that regime's locked torques
+        model::SharedRegime at_limit;      // empty: the regime at rest itself
+        std::vector<model::Bound> bounds;  // in the order of that regime's locked torques
     };
     // torques: those before. Nothing if the torques are elsewhere.
     std::optional<Hold> find(const Regime& rest, const Torques& torques, const State& x, const Memory& memory,

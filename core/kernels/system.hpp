@@ -48,14 +48,14 @@ class TrainSystem {
     bool overflowed() const { return overflowed_; }
     SwitchedTrain& search() const { return search_; }
 
-    std::shared_ptr<const Regime> build(const Key& key) const {
-        const std::shared_ptr<const Regime>& out = search_.regimes().share(key);
+    SharedRegime build(const Key& key) const {
+        const SharedRegime& out = search_.regimes().share(key);
         if (out->guards.size() > static_cast<std::size_t>(D::guards)) overflowed_ = true;
         return out;
     }
     const std::vector<Regime::PowerTerms>& flows(const Regime& r) const { return search_.regimes().flows(r); }
     // In these modes, at the instant and the torques of another regime.
-    std::shared_ptr<const Regime> build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
+    SharedRegime build_at(const Regime& other, const Key& modes, const InstantOf<D>& now) const {
         return build(search_.branches_at(other, modes, by_layout(now)));
     }
     Found start(InstantOf<D>& now, Key& key) const {

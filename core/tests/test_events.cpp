@@ -58,14 +58,14 @@ struct BouncingBall {
     static const LinearForm& torque_at_load(const Regime& r) { return r.output_torque[0]; }
 
     double restitution = 0.5;
-    std::unique_ptr<const Regime> build(const Key& key) const {
+    Shared<const Regime> build(const Key& key) const {
         static constexpr LinearForm::Term of_height{height, 1.0}, of_speed{speed, 1.0};
-        auto r = std::make_unique<Regime>();
-        r->key = key;
-        r->rate[height] = {&of_speed, 1, 1, 1, 1, 0.0};
-        r->rate[speed].one = -9.81;
-        r->guards.push_back({{&of_height, 1, 1, 1, 1, 0.0}, Guard::speed, ground});
-        return r;
+        Regime r;
+        r.key = key;
+        r.rate[height] = {&of_speed, 1, 1, 1, 1, 0.0};
+        r.rate[speed].one = -9.81;
+        r.guards.push_back({{&of_height, 1, 1, 1, 1, 0.0}, Guard::speed, ground});
+        return Shared<const Regime>::make(std::move(r));
     }
     Found start(InstantOf<Dims>&, Key&) const { return Found::yes; }
     template <class Cache>

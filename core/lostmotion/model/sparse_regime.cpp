@@ -131,10 +131,10 @@ SparseRegimes::SparseRegimes(const Assembly& assembly) : assembly_(assembly) {
                 far_from_event * rated_torque(assembly.train(), static_cast<int>(s));
 }
 
-const std::shared_ptr<const SparseRegime>& SparseRegimes::share(const Key& key) {
-    if (const Shared* known = table_[key]) return *known;
-    const Shared& made = known_.emplace_back(
-        std::make_shared<const SparseRegime>(composed(key), assembly_, near_state_, near_input_, form_));
+const SharedRegime& SparseRegimes::share(const Key& key) {
+    if (const SharedRegime* known = table_[key]) return *known;
+    const SharedRegime& made =
+        known_.emplace_back(SharedRegime::make(composed(key), assembly_, near_state_, near_input_, form_));
     table_.add(made);
     bytes_ += made->bytes();
     return made;

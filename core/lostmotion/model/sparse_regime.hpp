@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "../base/key_table.hpp"
+#include "../base/shared.hpp"
 #include "../base/signal.hpp"
 #include "assembly.hpp"
 #include "instant.hpp"
@@ -62,12 +63,14 @@ struct SparseRegime {
     FormMaker::Terms block_;  // of all forms
 };
 
+using SharedRegime = Shared<const SparseRegime>;
+
 class SparseRegimes {
  public:
     explicit SparseRegimes(const Assembly& assembly);
 
     // One that stays where it is while somebody has it.
-    const std::shared_ptr<const SparseRegime>& share(const Key& key);
+    const SharedRegime& share(const Key& key);
     // It stays where it is until the next call of `make_room`.
     const SparseRegime& operator[](const Key& key) { return *share(key); }
     // Forgets all regimes if they take more memory than is to be kept.
@@ -83,12 +86,11 @@ class SparseRegimes {
 
     const Assembly& assembly_;
     std::vector<double> near_state_, near_input_;
-    using Shared = std::shared_ptr<const SparseRegime>;
     struct KeyOf {
-        const Key& operator()(const Shared& r) const { return r->key; }
+        const Key& operator()(const SharedRegime& r) const { return r->key; }
     };
-    std::deque<Shared> known_;
-    KeyTable<const Shared, KeyOf> table_;
+    std::deque<SharedRegime> known_;
+    KeyTable<const SharedRegime, KeyOf> table_;
     std::size_t bytes_ = 0;
     Regime composed_;  // its memory is used again, as that of the next
     FormMaker form_;

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "../base/key_table.hpp"
+#include "../base/shared.hpp"
 #include "../kernel/bit_set.hpp"
 #include "../kernel/propagator.hpp"
 
@@ -31,7 +32,7 @@ class RegimeCache {
         Entry(const Entry&) = delete;
         Entry& operator=(const Entry&) = delete;
 
-        std::shared_ptr<const Regime> regime;
+        Shared<const Regime> regime;
         LinearRatesOf<D> rates;
         GuardTable guards;
         int n_guards;                        // as many as there is room for
