@@ -14,7 +14,7 @@ from lostmotion.model.process_loads import Amplifier
 from lostmotion.reports.catalogue_text import list_records, record_text, template
 from lostmotion.simulation.forms.drive_tables import drive_schema
 from lostmotion.sizing.supply import amplifier_rules, longest_above
-from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.candidate_rows import Axes
 from lostmotion.studies.selection.nearest_misses import not_judged
 from lostmotion.studies.selection.ranking import RankedCandidate
 from lostmotion.studies.selection.task_file import task_of

@@ -17,7 +17,7 @@ from lostmotion.sizing.finding import TASK_RULES, within
 from lostmotion.sizing.linear_stage_demands import at_input, stage_of, together
 from lostmotion.sizing.required_motion import duty_torque, input_demand, required_motion
 from lostmotion.sizing.supply import electrical_power, returned, supply_rules
-from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.candidate_rows import Axes
 from lostmotion.studies.selection.task_file import task_of
 from refusals import refusals_of, refused
 

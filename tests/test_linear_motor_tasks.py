@@ -9,7 +9,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.model.angle_torques import STANDARD_GRAVITY as G
-from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.candidate_rows import Axes
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study_definition import Study
 from refusals import refusals_of

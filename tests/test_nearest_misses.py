@@ -15,8 +15,8 @@ from lostmotion.simulation.runs.run import run
 from lostmotion.sizing.axis_task.axis_task import reference_of
 from lostmotion.sizing.axis_task.candidate_scenario import begins_alike, cycles_of
 from lostmotion.sizing.axis_task.cycle_demands import change
-from lostmotion.studies.runs.axis_cycles import VARIABLES, until_it_repeats
-from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.candidate_cycles import VARIABLES, until_it_repeats
+from lostmotion.studies.runs.candidate_rows import Axes
 from lostmotion.studies.runs.read_table import read_table
 from lostmotion.studies.runs.run_study import study
 from lostmotion.studies.selection.nearest_misses import least_factor, misses, not_judged, slowed
@@ -193,7 +193,7 @@ def test_a_run_that_goes_on_is_a_run_of_its_own(name: str, least: float, monkeyp
     """`least`: the relative difference of two cycles that ends a run, so that all stop after two cycles, or none."""
     study = task_of(TASKS[name])
     row = study.parameters(study.total - 1, study.total)[0]
-    monkeypatch.setattr("lostmotion.studies.runs.axis_cycles.REPEATS", least)
+    monkeypatch.setattr("lostmotion.studies.runs.candidate_cycles.REPEATS", least)
     found = until_it_repeats(study, row)
     count = found.cycles.count
     assert count == (2 if least else 4)

@@ -9,7 +9,7 @@ import pytest
 import lostmotion as lm
 from lostmotion.model.losses import efficiency_map
 from lostmotion.reports.study_selection import SelectionReport
-from lostmotion.studies.runs.axis_pairs import HOLDS, Axes, run_axes
+from lostmotion.studies.runs.candidate_rows import HOLDS, Axes, run_axes
 from lostmotion.studies.runs.read_table import read_table
 from lostmotion.studies.runs.run_study import study
 from lostmotion.studies.selection.nearest_misses import misses, not_judged

@@ -287,7 +287,7 @@ def test_a_selection_compares_the_torque_of_the_motion_with_the_pull_out_curve(t
     assert float(row.settling_time) < 0.2
     assert math.isnan(float(row.position_gain))
     assert float(pairs.sel(pair="maxon-ec-i-52-606793").position_gain) > 0.0
-    from lostmotion.studies.runs.axis_pairs import Axes
+    from lostmotion.studies.runs.candidate_rows import Axes
 
     study = lm.studies.load_task(tmp_path / "task.toml")
     (finding,) = (f for f in Axes(study).judged(study.parameters(0, 1)[0]) if f.rule == "stepper_torque")

@@ -10,7 +10,7 @@ import pytest
 import lostmotion as lm
 from conftest import ROOT
 from lostmotion.sizing.winding_temperature import rms
-from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.candidate_rows import Axes
 from lostmotion.studies.study.study_definition import Study
 
 TASKS = ROOT / "examples" / "tasks"

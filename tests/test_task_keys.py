@@ -13,7 +13,7 @@ from lostmotion.model.process_loads import Supply
 from lostmotion.model.task import Task
 from lostmotion.sizing.axis_task.axis_task import AxisTask
 from lostmotion.sizing.finding import TASK_RULES
-from lostmotion.studies.runs.axis_pairs import Axes
+from lostmotion.studies.runs.candidate_rows import Axes
 from lostmotion.studies.selection.task_file import task_of
 from lostmotion.studies.study.study_files import from_json, to_json
 from refusals import refused

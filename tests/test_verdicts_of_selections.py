@@ -6,7 +6,7 @@ from types import SimpleNamespace
 import pytest
 
 from lostmotion.reports.study_selection import SelectionReport
-from lostmotion.studies.runs.axis_pairs import HOLDS
+from lostmotion.studies.runs.candidate_rows import HOLDS
 from lostmotion.studies.selection.ranking import NOT_RUN, RankedCandidate
 from lostmotion.studies.study.drive_check_columns import NO_DATA, UNSTABLE
 from lostmotion.studies.study.select_table import Selection

@@ -12,9 +12,9 @@ from pydantic_core import CoreSchema
 
 from ..errors import InputError
 from ..units.scalars import plain
-from .display import abridged
 from .docstrings import docstring_of
 from .parameter_help import PartType, written_docstring
+from .part_display import abridged
 from .refusal_messages import refusal, shown
 
 
@@ -48,7 +48,7 @@ class Part(BaseModel, metaclass=PartType):
 
     def _repr_html_(self) -> str:
         """All values with their units, for notebooks."""
-        from .display import table
+        from .part_display import table
 
         return table(self)
 

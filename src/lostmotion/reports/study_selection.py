@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..sizing.axis_task.mass_and_price import CHOICE
-from ..studies.runs.axis_pairs import HOLDS
+from ..studies.runs.candidate_rows import HOLDS
 from ..studies.runs.read_table import labelled, unit_of
 from ..studies.selection.nearest_misses import Lacking, Miss, misses, not_judged, rules_not_judged
 from ..studies.selection.ranking import NOT_RUN, Price, RankedCandidate, candidates, pareto_front, prices

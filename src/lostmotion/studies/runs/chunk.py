@@ -11,7 +11,7 @@ from ...simulation.scenario.scenario import Scenario
 from ..study.study_definition import Study
 from ..study.study_files import from_json
 from ..study.wanted_values import channels, needed, reductions
-from .axis_pairs import run_axes
+from .candidate_rows import run_axes
 from .chunk_results import Runs
 from .runs_in_core import core_can, run_in_core, together
 from .runs_one_by_one import run_each

@@ -13,7 +13,7 @@ from ...errors import InputError
 from ...sizing.axis_task.axis_task import AxisTask, reference_of
 from ...sizing.axis_task.mass_and_price import CHOICE
 from ...units.practical import excess, told_apart
-from ..runs.axis_pairs import Axes
+from ..runs.candidate_rows import Axes
 from ..study.drive_check_columns import NO_DATA, UNSTABLE
 from ..study.study_definition import Study
 from .ranking import WINDOW, RankedCandidate

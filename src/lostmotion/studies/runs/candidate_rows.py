@@ -55,7 +55,7 @@ from ...sizing.supply import amplifier_rules, effective_current, electrical_powe
 from ..study.drive_check_columns import BETWEEN, ESTIMATED, MISSING, NO_DATA, UNSTABLE, columns_of
 from ..study.drive_check_columns import TASK_COLUMNS as CHECKS
 from ..study.study_definition import Study
-from .axis_cycles import until_it_repeats
+from .candidate_cycles import until_it_repeats
 from .chunk_results import Runs
 
 HOLDS = "holds from the least to the largest losses of its kind"
