@@ -20,15 +20,14 @@ class KeyTable {
         while (slots_[k] != nullptr && !(KeyOf()(*slots_[k]) == key)) k = (k + 1) & mask;
         return slots_[k];
     }
-    // Puts a thing that is not there yet.
-    void add(T& thing) {
-        if (2 * ++count_ > slots_.size()) {
-            std::vector<T*> old(2 * slots_.size(), nullptr);
-            std::swap(old, slots_);
-            for (T* t : old)
-                if (t != nullptr) (*this)[KeyOf()(*t)] = t;
-        }
-        (*this)[KeyOf()(thing)] = &thing;
+    // Puts a thing where its key has been looked for last.
+    void put(T*& here, T& thing) {
+        here = &thing;
+        if (2 * ++count_ <= slots_.size()) return;
+        std::vector<T*> old(2 * slots_.size(), nullptr);
+        std::swap(old, slots_);
+        for (T* t : old)
+            if (t != nullptr) (*this)[KeyOf()(*t)] = t;
     }
     void clear() {
         std::fill(slots_.begin(), slots_.end(), nullptr);

@@ -1,5 +1,7 @@
 #include "sparse_regime.hpp"
 
+#include <ranges>
+
 #include "power_flows.hpp"
 #include "scales.hpp"
 
@@ -45,12 +47,7 @@ SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const d
       driving_way(r.driving_way) {
     const Layout& n = a.layout();
     const std::size_t gears = r.output_torque.size();
-    std::vector<Row> lost;
-    for (std::size_t g = 0; g < gears; ++g) {
-        const Gear& gear = a.train().gears[g];
-        lost.push_back(gear.sense() * (gear.law.ratio * r.input_torque[g] - r.output_torque[g]));
-    }
-    std::size_t torques = lost.size();
+    std::size_t torques = gears;
     for (const auto* rows : {&r.output_torque, &r.input_torque, &r.contact_torque, &r.motor_torque, &r.drive_torque})
         torques += rows->size();
     const auto coupled = static_cast<std::size_t>((n.coupled + 3) / 4 * 4);
@@ -60,7 +57,7 @@ SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const d
 
     const auto all = [&](const auto& rows, auto&& row) {
         const LinearForm* first = forms_.data() + forms_.size();
-        for (const auto& f : rows) forms_.push_back(sparse(row(f)));
+        for (auto&& f : rows) forms_.push_back(sparse(row(f)));
         return Forms(first, rows.size());
     };
     const auto itself = [](const Row& f) -> const Row& { return f; };
@@ -71,7 +68,10 @@ SparseRegime::SparseRegime(const Regime& r, const Assembly& a, std::span<const d
     output_torque = all(r.output_torque, itself);
     if (gears == 0) output_torque = Forms(&forms_.emplace_back(), 1);
     input_torque = all(r.input_torque, itself);
-    mesh_loss = all(lost, itself);
+    mesh_loss = all(std::views::iota(std::size_t{0}, gears), [&](std::size_t g) {
+        const Gear& gear = a.train().gears[g];
+        return Row(gear.sense() * (gear.law.ratio * r.input_torque[g] - r.output_torque[g]));
+    });
     contact_torque = all(r.contact_torque, itself);
     motor_torque = all(r.motor_torque, itself);
     drive_torque = all(r.drive_torque, itself);
@@ -132,10 +132,11 @@ SparseRegimes::SparseRegimes(const Assembly& assembly) : assembly_(assembly) {
 }
 
 const SharedRegime& SparseRegimes::share(const Key& key) {
-    if (const SharedRegime* known = table_[key]) return *known;
+    const SharedRegime*& known = table_[key];
+    if (known != nullptr) return *known;
     const SharedRegime& made =
         known_.emplace_back(SharedRegime::make(composed(key), assembly_, near_state_, near_input_, form_));
-    table_.add(made);
+    table_.put(known, made);
     bytes_ += made->bytes();
     return made;
 }

@@ -253,11 +253,12 @@ class RegimeCache {
         const Key& operator()(const Entry& e) const { return e.regime->key; }
     };
     [[gnu::noinline]] Entry& find(const Key& key) {
-        if (Entry* known = table_[key]) return *(last_ = known);
+        Entry*& known = table_[key];
+        if (known != nullptr) return *(last_ = known);
         if (used_ == per_block * blocks_.size()) blocks_.push_back(std::make_unique_for_overwrite<Entry[]>(per_block));
         Entry& made = entry(used_++);
         made.set(system_, key);
-        table_.add(made);
+        table_.put(known, made);
         if constexpr (std::same_as<D, Any>) bytes_ += made.bytes();
         return *(last_ = &made);
     }
