@@ -27,7 +27,9 @@ from lostmotion.studies.runs.read_table import read_table
 from refusals import refused
 from test_random_axes import random_axis
 
-LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice")  # which only take longer
+LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice", "stepper-equatorial-mount")  # which only take longer
+# Those of the paper and those that track a target differ in numbers alone: one of each is tried.
+ALIKE = re.compile(r"paper-(?!2dof-nl-small)|tracking-(?!camera|loss-map)")
 NAMES_A_FORM = re.compile(
     r"\[shafts\]|\[axis\]|short form|long form|is a (drive )?train|are for (drives|trains)|must be a Drive|give an Initial|takes a (drive|train)|is no (drive|train)",
     re.I,
@@ -170,7 +172,7 @@ def brief(name: str) -> lm.Scenario:
     return scenario.replace(**times, task={})
 
 
-@pytest.mark.parametrize("name", [name for name in lm.shipped_scenarios() if name not in LARGE])
+@pytest.mark.parametrize("name", [name for name in lm.shipped_scenarios() if name not in LARGE and not ALIKE.match(name)])
 def test_no_function_refuses_a_shipped_scenario_by_its_form(name: str, tmp_path: Path) -> None:
     (tmp_path / "own").mkdir()
     scenario = brief(name)
