@@ -144,8 +144,8 @@ def explained(scenario: Scenario, time: float) -> dict[int, dict[str, list[float
 @pytest.mark.parametrize("name", ["position-axis", "ball-screw-axis", "direction-finder"])
 def test_a_scenario_has_one_description(name: str) -> None:
     """So that an FMU keeps its identifier: where numbers lie in memory has no say in the order in which they are compared."""
-    made = [lm.portable.description(lm.load(name)) for _ in range(4)]
-    assert all(np.array_equal(one, made[0]) for one in made[1:])
+    made = [lm.portable.description(lm.load(name)) for _ in range(2)]
+    assert np.array_equal(*made)
 
 
 @pytest.mark.parametrize("name", ["paper-2dof-nl-small", "worm-lowering", "two-motors-one-ring"])
