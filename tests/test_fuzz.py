@@ -14,7 +14,7 @@ from fuzz.faults import FAULTS
 from fuzz.watchdog import Case, failure_of
 
 NEEDS = {"log_files": ("asammdf", "nptdms", "mcap", "rosbags", "h5py", "openpyxl"), "study_folders": ("pyarrow",)}
-COUNTS = {"scenario_files": 8, "command_lines": 4, "study_folders": 4, "log_files": 12, "fmu_calls": 3, "random_trains": 8}
+COUNTS = {"scenario_files": 4, "command_lines": 3, "study_folders": 3, "log_files": 6, "fmu_calls": 2, "random_trains": 4}
 
 
 @pytest.mark.filterwarnings("default")

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 import lostmotion as lm
+from conftest import some
 from impact_reference import Chain, Vector, random_chain
 from tables import gear_between, mesh_efficiency, run_of, torque_source
 
@@ -139,12 +140,12 @@ def test_random_chains_are_those_of_momentum_and_restitution() -> None:
 
 
 def test_random_chains_with_friction_are_those_of_momentum_and_restitution() -> None:
-    compare(range(int(max(30, 300 * SHARE))), 60, friction=True)
+    compare(range(int(max(12, 300 * SHARE))), 60, friction=True)
 
 
 def test_flanks_accumulate_beside_others_that_part_for_long() -> None:
     """All are without a gap at that instant: those that part at a speed take no part."""
-    compare([312, 458, 722, 1247, 1521, 1660, 1695, 1876], 61, friction=True)
+    compare([312, 458, 722, 1247, 1521, 1660, 1695, 1876][: some(8, 3)], 61, friction=True)
 
 
 @pytest.mark.parametrize("duration", [0.14, 0.2, 0.3])
