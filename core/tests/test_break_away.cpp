@@ -1,9 +1,9 @@
 // Contacts that hold more than they take while they slip: which of several consistent combinations of modes follows.
 #include <doctest/doctest.h>
 
+#include "paused_run.hpp"
 #include "random_trains.hpp"
 #include "regularised_contacts.hpp"
-#include "plain_integrator.hpp"
 
 TEST_SUITE_BEGIN("break_away");
 
@@ -46,14 +46,14 @@ Outcome run_of(const ClutchedShafts& row, double speed, double duration) {
     for (int s = 0; s < static_cast<int>(row.torque.size()); ++s) {
         const auto k = static_cast<std::size_t>(s);
         run.speed(s) = speed;
-        run.inputs[run.load(s)] = {{-row.torque[k]}, {.value = -row.after_jump[k], .from = row.jump}};
+        run.inputs[run.load(s)] = lines({{0.0, -row.torque[k]}, {row.jump, -row.after_jump[k]}});
     }
     REQUIRE(run.begin());
     Outcome out;
     for (int c = 0; c < run.layout().contacts; ++c)
         if (run.assembly.places().contacts[c].kind == ContactPlace::coupling) out.slips_at_once |= run.mode(c) != 0;
     REQUIRE(run.run(duration));
-    for (const TrainEvent& e : run.events) out.open |= !run.assembly.build(e.after).locked.empty();
+    for (const auto& e : run.events) out.open |= !run.assembly.build(e.after).locked.empty();
     for (std::size_t s = 0; s < row.torque.size(); ++s) out.speeds.push_back(run.speed(static_cast<int>(s)));
     return out;
 }

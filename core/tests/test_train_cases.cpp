@@ -1,7 +1,7 @@
 // Whole trains whose motion is known: chains, a worm on a coupling, two motors on one ring, play with damping.
 #include <doctest/doctest.h>
 
-#include "plain_integrator.hpp"
+#include "paused_run.hpp"
 
 TEST_SUITE_BEGIN("train_cases");
 
@@ -32,7 +32,7 @@ TEST_CASE("a stiff coupling in a chain makes a difference that falls with its st
     two.gears = {spring(0, 1, 20.0, TorsionCurve({}, {2000.0}))};
     two.gears[0].efficiencies = MeshEfficiency(0.6, -0.1);
     TrainRun reference(two);
-    reference.inputs[0] = {{0.1}};
+    reference.inputs[0] = constant(0.1);
     REQUIRE(reference.run(0.5));
     double before = 0.0;
     for (const double k : {1e2, 1e3, 1e4}) {
@@ -44,8 +44,7 @@ TEST_CASE("a stiff coupling in a chain makes a difference that falls with its st
         coupling.mesh_damping = 0.01 * std::sqrt(k);
         three.gears.insert(three.gears.begin(), coupling);
         TrainRun run(three);
-        run.step = 2.5e-4;
-        run.inputs[0] = {{0.1}};
+        run.inputs[0] = constant(0.1);
         REQUIRE(run.run(0.5));
         const double difference = std::fabs(run.speed(2) / reference.speed(1) - 1.0);
         // The rotor lags by T/k: first order in the compliance.
@@ -63,7 +62,7 @@ TEST_CASE("the rotor rings on its coupling while a loaded self-locking worm stay
     t.gears = {spring(0, 1, 1.0, TorsionCurve({}, {k_1})), rigid_gear(1, 2, 50.0)};
     t.gears[1].efficiencies = MeshEfficiency(0.3, -0.2);
     TrainRun run(t);
-    run.inputs[run.load(2)] = {{-20.0}};
+    run.inputs[run.load(2)] = constant(-20.0);
     run.twist(0) = swing;  // the worm holds |eta_b| M/i = 0.08 N m of the motor's side, the coupling brings 0.05
     REQUIRE(run.begin());
     for (const double time : {0.01, 0.037, 0.2}) {
@@ -87,9 +86,8 @@ TEST_CASE("two motors on one ring: a bias keeps the play closed until the instan
     // Both are pressed against their flanks by i * bias from the start.
     run.twist(0) = gap + i * bias / k;
     run.twist(1) = -run.twist(0);
-    run.step = 2e-4;
-    run.inputs[run.command(0)] = {{.value = bias, .slope = -rate}};
-    run.inputs[run.command(1)] = {{-bias}};
+    run.inputs[run.command(0)] = lines({{0.0, bias, -rate}});
+    run.inputs[run.command(1)] = constant(-bias);
     REQUIRE(run.run(1.5));
     // All turn together with alpha = -i rate t/J; the first mesh carries i (bias - rate t) - i^2 J_M alpha. The swing
     // that the beginning of the ramp starts shifts the instant by 1/omega at most.
@@ -110,7 +108,8 @@ TEST_CASE("play with damping follows an independent integration") {
     t.gears[0].mesh_damping = d;
     TrainRun run(t);
     run.speed(0) = w_0;
-    run.inputs[0] = {{.value = 1.0, .amplitude = 10.0, .omega = 4.0}};
+    run.inputs[0] = sine(10.0, 4.0 / (2.0 * pi));
+    run.inputs[0].breakpoints[0].value = 1.0;
     REQUIRE(run.begin());
     double phi = 0.0, w = w_0;
     const auto acceleration = [&](double time, double x, double v) {

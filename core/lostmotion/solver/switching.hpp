@@ -79,15 +79,17 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
                      Observer<System>& observer) {
     using Guard = typename System::Guard;
     if (fired != nullptr && fired->kind == Guard::outside) return Status::outside;
+    // The torques that contacts pass on up to a jump of an input are those of its left limit.
+    if (fired == nullptr) input.anchor_left(time);
+    InputsOf<D> before = input.values();
     std::optional<SwitchingOf<System>> shown;
     if (observer.wants_switching()) {
         SwitchingOf<System>& s = shown.emplace();
         const auto& old = cache.regime(key);
-        if (fired == nullptr) input.anchor_left(time);
         s.time = time;
         s.input_jump = fired == nullptr;
         s.before = key;
-        s.torque_before = evaluate<D>(system.torque_at_load(old), now.x, now.memory, input.values());
+        s.torque_before = evaluate<D>(system.torque_at_load(old), now.x, now.memory, before);
         if (fired != nullptr) {
             s.kind = fired->kind;
             s.contact = fired->contact;
@@ -95,24 +97,17 @@ Status switch_regime(const System& system, Cache& cache, InputState<D>& input, d
             s.guard = static_cast<int>(fired - old.guards.data());
         }
     }
-    // An input that drives a contact to its limit has taken the torque with it up to here.
-    std::optional<InputsOf<D>> before;
-    if (fired == nullptr) {
-        if (follows_inputs(cache.regime(key))) {
-            input.anchor_left(time);
-            before = input.values();
-        }
-        input.anchor(time);
-    }
+    if (fired == nullptr) input.anchor(time);
     see_inputs(system, input, time, now);
-    if constexpr (requires { system.set_remainders(now); })
-        if (before) {
-            InstantOf<D> left = now;
-            left.input[0] = *before;
-            system.set_remainders(left);
-            before = left.input[0];
-        }
-    const Found found = system.next(cache, now, fired, key, before ? *before : now.input[0]);
+    if (fired != nullptr) {
+        before = now.input[0];
+    } else if constexpr (requires { system.set_remainders(now); }) {
+        InstantOf<D> left = now;
+        left.input[0] = before;
+        system.set_remainders(left);
+        before = left.input[0];
+    }
+    const Found found = system.next(cache, now, fired, key, before);
     if (found != Found::yes) return status_of(found);
     if (shown) show_switching(system, cache, now, key, *shown, observer);
     return Status::done;
