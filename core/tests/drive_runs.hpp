@@ -13,6 +13,12 @@ struct Start {
     double hysteresis_capacity = 0.0;  // [N m]
 };
 
+inline Start start_at(std::initializer_list<std::pair<Quantity, double>> states) {
+    Start s;
+    for (const auto& [state, value] : states) s.x[state] = value;
+    return s;
+}
+
 inline std::size_t channel_number(const std::vector<TrainChannel>& channels, Quantity q) {
     for (std::size_t c = 0; c < channels.size(); ++c)
         if (channels[c].name == quantity_names[q]) return c;

@@ -19,8 +19,7 @@ class SelfLockingDrives : public RandomDrives {
         Gearbox& g = d.gearbox;
         d.motor.friction_torque = d.load.friction_torque = 0.0;
         if (g.compliance == Gearbox::rigid) {
-            g.compliance = Gearbox::torsion_curve;
-            g.curve = TorsionCurve({}, {std::pow(2.0 * pi * spread(5.0, 150.0), 2) * d.input_inertia() * g.ratio});
+            set_curve(d, {}, {std::pow(2.0 * pi * spread(5.0, 150.0), 2) * d.input_inertia() * g.ratio});
         }
         g.hysteresis_efficiency = hysteresis_ ? uniform(0.7, 0.99) : 1.0;
         g.losses = Gearbox::loss_map;

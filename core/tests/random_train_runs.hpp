@@ -379,11 +379,6 @@ inline bool loses_only(const Train& t) {
     return std::none_of(t.gears.begin(), t.gears.end(),
                         [](const Gear& g) { return !g.has_dry_losses() && g.law.efficiency < 1.0; });
 }
-inline Signal mirrored(Signal s) {
-    for (Breakpoint& b : s.breakpoints) b = {b.time, -b.value, -b.slope};
-    for (Sine& w : s.sines) w.amplitude = -w.amplitude;
-    return s;
-}
 // The same signal with its zero of time at t.
 inline Signal from(const Signal& s, double t) {
     Signal out;
@@ -438,7 +433,7 @@ inline void check_laws(RandomTrains& random, int shafts, double duration, LawTal
         const std::size_t motors_and_loads =
             r.train.motors.size() + static_cast<std::size_t>(std::count_if(r.train.shafts.begin(), r.train.shafts.end(),
                                                                            [](const Shaft& s) { return s.loaded; }));
-        for (std::size_t k = 0; k < motors_and_loads; ++k) inputs[k] = mirrored(inputs[k]);
+        for (std::size_t k = 0; k < motors_and_loads; ++k) inputs[k] = test::mirrored(inputs[k]);
         const Recorded image(r.train, inputs, duration, duration / 40.0);
         if (const double d = image.done() ? difference(run, image, -1.0) : 1.0; d > near)
             count(tally.unlike_mirror, "its mirror image differs", d);

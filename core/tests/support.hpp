@@ -84,6 +84,16 @@ inline Drive plain_drive(double ratio, double J_1, double J_2) {
     return d;
 }
 
+inline void set_curve(Drive& d, const std::vector<double>& edges, const std::vector<double>& slopes) {
+    d.gearbox.compliance = Gearbox::torsion_curve;
+    d.gearbox.curve = TorsionCurve(edges, slopes);
+}
+inline Signal mirrored(Signal s) {
+    for (Breakpoint& b : s.breakpoints) b = {b.time, -b.value, -b.slope};
+    for (Sine& w : s.sines) w.amplitude = -w.amplitude;
+    return s;
+}
+
 // Random drives that mix all parts and signals. Sizes are drawn by the logarithm, over what real drives have.
 class RandomDrives {
  public:

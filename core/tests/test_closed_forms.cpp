@@ -29,11 +29,9 @@ TEST_SUITE("closed_forms") {
 
     TEST_CASE("two masses: resonance 84.217 Hz, anti-resonance 59.550 Hz") {
         Drive d = plain_drive(1.0, 0.005, 0.005);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {700.0});
+        set_curve(d, {}, {700.0});
         // Free: the twist from rest swings with the resonance, and nothing else.
-        Start start;
-        start.x[twist] = 1e-3;
+        const Start start = start_at({{twist, 1e-3}});
         const Samples free = run(d, {}, 1.0, 1e-3, start);
         const double resonance = std::sqrt(700.0 * 2.0 / 0.005);
         CHECK(resonance / (2.0 * pi) == Approx(84.217).epsilon(1e-5));
@@ -42,8 +40,7 @@ TEST_SUITE("closed_forms") {
         // Driven with the anti-resonance, the steady motion of the input is zero: start on it.
         const double anti = std::sqrt(700.0 / 0.005), torque = 0.7;
         CHECK(anti / (2.0 * pi) == Approx(59.550).epsilon(1e-5));
-        Start driven;
-        driven.x[load_speed] = -torque * anti / 700.0;
+        const Start driven = start_at({{load_speed, -torque * anti / 700.0}});
         const Samples s = run(d, {sine(torque, anti / (2.0 * pi)), Signal{}}, 1.0, 1e-3, driven);
         for (std::size_t k = 0; k < s.samples; ++k)
             CHECK(s(motor_speed, k) == Approx(0.0).scale(torque * anti / 700.0).epsilon(1e-9));
@@ -52,11 +49,9 @@ TEST_SUITE("closed_forms") {
     TEST_CASE("free oscillation decays with its damping") {
         // The input shaft is far too heavy to move: one mass on a spring.
         Drive d = plain_drive(1.0, 1e18, 2.0);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {800.0});
+        set_curve(d, {}, {800.0});
         d.load.viscous_friction = 4.0;
-        Start start;
-        start.x[twist] = -0.01;
+        const Start start = start_at({{twist, -0.01}});
         const Samples s = run(d, {}, 2.0, 1e-3, start);
         const double a = 4.0 / (2.0 * 2.0), w = std::sqrt(800.0 / 2.0 - a * a);
         for (std::size_t k = 0; k < s.samples; ++k) {
@@ -69,8 +64,7 @@ TEST_SUITE("closed_forms") {
     TEST_CASE("Coulomb friction coasts to a stop at the exact instant, and stays") {
         Drive d = plain_drive(1.0, 2e-3, 3e-3);
         d.motor.friction_torque = 0.05;
-        Start start;
-        start.x[motor_speed] = start.x[load_speed] = 4.0;
+        const Start start = start_at({{motor_speed, 4.0}, {load_speed, 4.0}});
         const Samples s = run(d, {}, 1.0, 1e-3, start);
         REQUIRE(s.report.switching_count == 1);
         CHECK(s.report.switchings[0].time == Approx(5e-3 * 4.0 / 0.05).epsilon(1e-14));
@@ -90,10 +84,8 @@ TEST_SUITE("closed_forms") {
 
     TEST_CASE("backlash is traversed in the exact time") {
         Drive d = plain_drive(10.0, 1e-4, 2.0);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({2e-3}, {0.0, 5e4});
-        Start start;
-        start.x[twist] = -2e-3;
+        set_curve(d, {2e-3}, {0.0, 5e4});
+        const Start start = start_at({{twist, -2e-3}});
         const Samples s = run(d, {constant(0.3), Signal{}}, 0.006, 1e-4, start);
         // The input accelerates alone through the whole gap: 4 mrad at the output.
         REQUIRE(s.report.switching_count >= 1);
@@ -103,8 +95,7 @@ TEST_SUITE("closed_forms") {
     TEST_CASE("hysteresis loop has the area that its capacity and width give") {
         // Load held almost still by its inertia, input swinging slowly: T_2 = P + h, a parallelogram.
         Drive d = plain_drive(1.0, 1e-6, 1e9);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {1000.0});
+        set_curve(d, {}, {1000.0});
         d.gearbox.hysteresis_efficiency = 0.9;
         d.gearbox.viscous_friction = 0.05;
         const double amplitude = 2.0;
@@ -157,10 +148,8 @@ TEST_SUITE("closed_forms") {
             const double re = omega2 - w * w, im = two_xi_omega * w, gain = k_N * 0.521 / (J * tau);
             const double real = gain * re / (re * re + im * im), imag = -gain * im / (re * re + im * im);
             // Start on the periodic solution w_M = Im(H e^(i w t)).
-            Start start;
-            start.x[motor_speed] = imag;
-            start.x[load_speed] = imag / 90.0;
-            start.x[motor_torque] = J * w * real + b * imag;
+            const Start start =
+                start_at({{motor_speed, imag}, {load_speed, imag / 90.0}, {motor_torque, J * w * real + b * imag}});
             const Samples s = run(d, {sine(1.0, f), Signal{}}, 3.0 / f, 0.01 / f, start);
             for (std::size_t k = 0; k < s.samples; ++k) {
                 const double t = k * 0.01 / f;

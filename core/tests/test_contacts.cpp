@@ -159,8 +159,7 @@ TEST_SUITE("contacts") {
 
     TEST_CASE("self-locking: a gear with negative back-driving efficiency holds any load") {
         Drive d = plain_drive(60.0, 1e-4, 0.5);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {5e3});
+        set_curve(d, {}, {5e3});
         d.gearbox.losses = Gearbox::loss_map;
         d.gearbox.rated_output_torque = 70.0;
         d.gearbox.rated_input_speed = 300.0;
@@ -184,12 +183,9 @@ TEST_SUITE("contacts") {
         const double a = 1.0 - -0.5;
         d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {a, a, 0.0, 0.0, 2.0, 2.0});
         CHECK(d.jams());
-        Start start;
-        start.x[motor_speed] = 60.0;
-        start.x[load_speed] = 1.0;
+        const Start start = start_at({{motor_speed, 60.0}, {load_speed, 1.0}});
         CHECK(run(d, {constant(-0.5), Signal{}}, 5.0, 0.01, start).report.status == Status::jammed);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {5e4});
+        set_curve(d, {}, {5e4});
         const Samples s = run(d, {constant(-0.5), Signal{}}, 5.0, 0.01, start);
         CHECK(s.report.status == Status::done);
     }
@@ -198,8 +194,7 @@ TEST_SUITE("contacts") {
         Drive d = plain_drive(10.0, 1e-4, 0.5);
         d.motor.friction_torque = 0.5;
         d.load.friction_torque = 2.0;
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {1e3});
+        set_curve(d, {}, {1e3});
         // M_Z alone: the load holds up to T_f, then moves against the spring whose other end is held by the motor.
         const Samples s = run(d, {Signal{}, lines({{0.0, 0.0, 1.0}})}, 3.0, 0.01);
         REQUIRE(s.report.status == Status::done);
@@ -231,15 +226,8 @@ TEST_SUITE("contacts") {
         for (int n = 0; n < cases(300); ++n) {
             Drive drive = random.drive();
             if (drive.jams()) continue;
-            Signals signals = random.signals(drive, 0.3), mirrored = signals;
-            for (Signal& s : mirrored) {
-                for (Breakpoint& k : s.breakpoints) {
-                    k.value = -k.value;
-                    k.slope = -k.slope;
-                }
-                for (Sine& a : s.sines) a.amplitude = -a.amplitude;
-            }
-            const Samples a = run(drive, signals, 0.3, 0.01), b = run(drive, mirrored, 0.3, 0.01);
+            const Signals signals = random.signals(drive, 0.3), image{mirrored(signals[0]), mirrored(signals[1])};
+            const Samples a = run(drive, signals, 0.3, 0.01), b = run(drive, image, 0.3, 0.01);
             REQUIRE(a.report.status == Status::done);
             REQUIRE(b.report.status == Status::done);
             CAPTURE(n);

@@ -232,8 +232,7 @@ TEST_SUITE("parts") {
     }
     TEST_CASE("the adaptive solver's error falls with its tolerance") {
         Drive d = plain_drive(1.0, 0.005, 0.005);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {700.0});
+        set_curve(d, {}, {700.0});
         const Signals signals{sine(1.0, 20.0), Signal{}};
         const double exact = run(d, signals, 0.5).report.x[load_speed];
         double previous = 1.0;

@@ -170,14 +170,12 @@ TEST_SUITE("dying_out") {
     TEST_CASE("everything that holds a load vanishes with it: a swinging load on a locked input") {
         // w = 0.25 cos 8 t; capacity b |T_2|/i and held torque |T_2|/i pass zero together at t = pi/16 k.
         Drive d = plain_drive(2.0, 1.0, 4.0);
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({}, {256.0});
+        set_curve(d, {}, {256.0});
         d.gearbox.losses = Gearbox::loss_map;
         d.gearbox.rated_output_torque = 4.0;
         for (const double b : {1.1, 2.0}) {
             d.gearbox.map = LossMap({0.0, 1.0}, {-1.0, 0.0, 1.0}, {b, b, 0.0, 0.0, 0.5, 0.5});
-            Start start;
-            start.x[load_speed] = 0.25;
+            const Start start = start_at({{load_speed, 0.25}});
             const Samples s = run(d, {}, 20.0, 0.01, start);
             REQUIRE(s.report.status == Status::done);
             for (std::size_t k = 0; k < s.samples; ++k) {

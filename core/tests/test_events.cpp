@@ -26,8 +26,7 @@ Samples swinging(double at, double duration, double interval) {
     d.gearbox.compliance = Gearbox::torsion_curve;
     const double k = 2.0 * std::pow(2.0 * pi * 10.0, 2);
     d.gearbox.curve = TorsionCurve({at}, {k, k});
-    Start start;
-    start.x[twist] = 1e-3;
+    const Start start = start_at({{twist, 1e-3}});
     return run(d, {}, duration, interval, start);
 }
 
@@ -155,8 +154,7 @@ TEST_SUITE("events") {
         Drive d = plain_drive(10.0, 1e-4, 0.5);
         d.motor.friction_torque = 0.1;
         d.load.friction_torque = 0.2;
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({1e-3}, {0.0, 1e4});
+        set_curve(d, {1e-3}, {0.0, 1e4});
         d.gearbox.hysteresis_efficiency = 0.9;
         const Signals signals{lines({{0.0, 0.0, 0.0}, {0.1, 0.5, 0.0}, {0.2, -0.5, 0.0}, {0.3, 0.0, 0.0}}), Signal{}};
         const Samples exact = run(d, signals, 0.6), fine = run(d, signals, 0.6, 1e-3, {}, 1e-12);
@@ -169,10 +167,8 @@ TEST_SUITE("events") {
         Drive d = plain_drive(1.0, 1e-3, 1e-3);
         d.motor.friction_torque = 0.01;
         d.load.friction_torque = 0.01;
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({1.0}, {0.0, 1e3});
-        Start start;
-        start.x[motor_speed] = start.x[load_speed] = 2.0;
+        set_curve(d, {1.0}, {0.0, 1e3});
+        const Start start = start_at({{motor_speed, 2.0}, {load_speed, 2.0}});
         const Samples s = run(d, {}, 1.0, 0.1, start);
         REQUIRE(s.report.status == Status::done);
         CHECK(s.report.x[motor_speed] == 0.0);

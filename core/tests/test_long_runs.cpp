@@ -326,8 +326,7 @@ TEST_SUITE("long_runs") {
         for (const bool rigid : {true, false}) {
             Drive d = plain_drive(1.0, 0.7, 1.9);
             if (!rigid) {
-                d.gearbox.compliance = Gearbox::torsion_curve;
-                d.gearbox.curve = TorsionCurve({}, {4e4});
+                set_curve(d, {}, {4e4});
             }
             const double a = 2.5;
             const Samples s = run(d, {sine(a, 1.3), Signal{}}, years, 1e7);
@@ -355,8 +354,7 @@ TEST_SUITE("long_runs") {
             d.gearbox.efficiency = random.uniform(0.4, 1.0);
             const double swing = 2.0 * pi * random.spread(5.0, 150.0),
                          J = d.input_inertia() * d.gearbox.ratio * d.gearbox.ratio;
-            d.gearbox.compliance = Gearbox::torsion_curve;
-            d.gearbox.curve = TorsionCurve({}, {swing * swing * J});
+            set_curve(d, {}, {swing * swing * J});
             d.load.viscous_friction = d.load.inertia * random.spread(0.01, 10.0);
             Signals signals;
             const double duration = random.spread(1e6, 1e9);

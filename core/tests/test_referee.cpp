@@ -35,8 +35,7 @@ Drive proportional_losses(Drive d, double a_forward, double a_back) {
 }
 
 Drive sprung(Drive d, double stiffness, double eta_H = 1.0) {
-    d.gearbox.compliance = Gearbox::torsion_curve;
-    d.gearbox.curve = TorsionCurve({}, {stiffness});
+    set_curve(d, {}, {stiffness});
     d.gearbox.hysteresis_efficiency = eta_H;
     return d;
 }
@@ -157,8 +156,7 @@ TEST_SUITE("referee") {
     TEST_CASE("play is traversed, taken up and left again") {
         Drive d = plain_drive(10.0, 2e-4, 0.05);
         const double k = 300.0, d_1 = 2e-3, M = 0.4, i = 10.0, J = 2e-4, J_Z = 0.05;
-        d.gearbox.compliance = Gearbox::torsion_curve;
-        d.gearbox.curve = TorsionCurve({d_1}, {0.0, k});
+        set_curve(d, {d_1}, {0.0, k});
         const double a = M / (J * i), W = std::sqrt(k * (1.0 / (J * i * i) + 1.0 / J_Z));
         const double contact = std::sqrt(2.0 * d_1 / a), v = a * contact;
         // D = a/W^2 (1 - cos W s) + v/W sin W s is zero again where tan(W s/2) = -v W/a.
