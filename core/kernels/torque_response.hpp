@@ -13,8 +13,8 @@
 #include <cstdint>
 #include <optional>
 
-#include "reset_jacobian.hpp"
 #include "lostmotion/solver/exact_solver.hpp"
+#include "reset_jacobian.hpp"
 
 namespace lostmotion {
 

@@ -1,8 +1,8 @@
 // Periodic motions and responses of a train.
 #pragma once
 
-#include "reset_jacobian.hpp"
 #include "lostmotion/simulation/train_status.hpp"
+#include "reset_jacobian.hpp"
 #include "response.hpp"
 #include "sampler.hpp"
 #include "train_solving.hpp"
