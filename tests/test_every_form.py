@@ -28,8 +28,8 @@ from refusals import refused
 from test_random_axes import random_axis
 
 LARGE = ("conveyor-start", "gantry-two-screws", "thruster-in-ice", "stepper-equatorial-mount")  # which only take longer
-# Those of the paper and those that track a target differ in numbers alone: one of each is tried.
-ALIKE = re.compile(r"paper-(?!2dof-nl-small)|tracking-(?!camera|loss-map)")
+# They differ from another one in numbers alone.
+ALIKE = re.compile(r"paper-.*-large|tracking-constant-efficiency")
 NAMES_A_FORM = re.compile(
     r"\[shafts\]|\[axis\]|short form|long form|is a (drive )?train|are for (drives|trains)|must be a Drive|give an Initial|takes a (drive|train)|is no (drive|train)",
     re.I,
