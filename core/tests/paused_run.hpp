@@ -35,7 +35,11 @@ class TrainRun : Observer<TrainSystem<Any>> {
     double& twist(int gear) { return now.x[assembly.places().gears[gear].twist]; }
     int command(int motor) const { return assembly.places().motors[motor].command; }
     int load(int shaft) const { return assembly.places().shafts[shaft].load; }
-    const Regime& regime() { return regime_.emplace(assembly.build(key)); }
+    // Of the present key; it stays where it is until that changes.
+    const Regime& regime() {
+        if (!regime_ || !(regime_->key == key)) regime_.emplace(assembly.build(key));
+        return *regime_;
+    }
     double value(const Row& f) { return evaluate(layout(), f, now); }
     double acceleration(int shaft) { return value(regime().rate[assembly.places().shafts[shaft].speed]); }
     int mode(int contact) const { return key.modes[contact]; }
