@@ -35,7 +35,7 @@ class TrainRun : Observer<TrainSystem<Any>> {
     double& twist(int gear) { return now.x[assembly.places().gears[gear].twist]; }
     int command(int motor) const { return assembly.places().motors[motor].command; }
     int load(int shaft) const { return assembly.places().shafts[shaft].load; }
-    // Of the present key; it stays where it is until that changes.
+    // The regime of the present key. The reference holds until the key changes.
     const Regime& regime() {
         if (!regime_ || !(regime_->key == key)) regime_.emplace(assembly.build(key));
         return *regime_;

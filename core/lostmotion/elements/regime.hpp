@@ -191,9 +191,9 @@ struct Regime {
     // By the modes alone:
     Ties ties;
     Flags kept_at_rest;   // contacts whose speeds the ties keep at zero
-    Flags at_rest;        // of these and of those that are redundant, all but the ends of gaps that are open
+    Flags at_rest;        // contacts that are kept at rest or redundant, but no gap that is open
     Flags twist_rests;    // gears whose twist has no rate
-    bool light_shafts{};  // whether inertias of shafts that hang together differ much
+    bool light_shafts{};  // whether inertias of tied shafts differ much
     std::vector<Driver<Row>> drivers;
     std::vector<LockedTorque<Row>> locked;  // in the order in which they are held: from the load to the motors
     // The only driver, if it is one input, and which way this has to go on.

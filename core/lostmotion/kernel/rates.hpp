@@ -321,9 +321,9 @@ struct LinearRatesOf {
     }
 };
 
-// The coefficients of A that are not zero, and those of B, input by input. Those of A stand in strips: of four rows
-// that follow each other, what lies on one diagonal. The states of a chain depend on their neighbours, so few strips
-// are all that a train has.
+// The coefficients of A that are not zero, in strips, and those of B, input by input. A strip holds what lies on one
+// diagonal in four rows that follow each other. The states of a chain depend on their neighbours, so few strips are all
+// that a train has.
 class SparseRates {
  public:
     std::vector<std::vector<std::pair<int, double>>> of_input;

@@ -92,7 +92,7 @@ class SparseRegimes {
     std::deque<SharedRegime> known_;
     KeyTable<const SharedRegime, KeyOf> table_;
     std::size_t bytes_ = 0;
-    Regime composed_;  // its memory is used again, as that of the next
+    Regime composed_;  // the memory of this one and of the maker of forms is used again
     FormMaker form_;
 };
 

@@ -49,7 +49,7 @@ class Statics {
     // Eliminates the reactions from the motion and the forms, and finds the speeds of shafts without inertia. False if
     // they have no unique solution.
     bool solve(Forms forms);
-    // Do the inertias of shafts that hang together, as one of them feels them, differ that much?
+    // Do the inertias of tied shafts, as one of these feels them, differ that much?
     bool has_light_shafts() const;
 
  private:
